@@ -195,10 +195,7 @@ impl Shared {
         // Another owner of the space begins where the journal ends, which may be before.
         let age = |estimate: &Estimate| (estimate.term, estimate.seq);
         let known = state.estimate.as_ref();
-        let is_late = known.is_some_and(|known| {
-            let is_again = estimate.map_revision == known.map_revision;
-            age(&estimate) < age(known) || (age(&estimate) == age(known) && is_again)
-        });
+        let is_late = known.is_some_and(|known| age(&estimate) < age(known));
         if estimate.session != state.session || is_outdated || is_late {
             return;
         }

@@ -11,6 +11,15 @@ from .problem import Problem
 from .wake import Wake
 
 
+def is_news(estimate: Estimate, known: Estimate) -> bool:
+    """Whether one of a run is later than another one, or of the same sample and another map.
+    Another owner of the space begins where the journal ends, which may be before."""
+    age, known_age = (estimate.term, estimate.seq), (known.term, known.seq)
+    return age > known_age or (
+        age == known_age and estimate.map_revision != known.map_revision
+    )
+
+
 class Incoming:
     """The messages that wait for a run's thread, a queue for each kind."""
 

@@ -29,7 +29,7 @@ from .errors import (
     WindowFull,
 )
 from .fork import zenoh_begins
-from .incoming import Incoming
+from .incoming import Incoming, is_news
 from .listeners import Listeners, WeakListeners
 from .problem import Problem
 from .rejection import Rejections, sentences
@@ -439,7 +439,7 @@ class Run:
         with self.changed:
             is_outdated = self.window.is_outdated(estimate.term)
             known = self.estimate
-        is_news = known is None or _is_news(estimate, known)
+        is_news = known is None or is_news(estimate, known)
         return not is_outdated and estimate.session == self.session_id and is_news
 
     def _take_estimate(self, estimate: Estimate) -> None:
@@ -495,12 +495,3 @@ class Run:
             _log.warning("%s: %s", self.agent, sentence)
         for rejection in told:
             self._listeners.hear_rejection(rejection)
-
-
-def _is_news(estimate: Estimate, known: Estimate) -> bool:
-    """Whether one of a run is later than another one, or of the same sample and another map.
-    Another owner of the space begins where the journal ends, which may be before."""
-    age, known_age = (estimate.term, estimate.seq), (known.term, known.seq)
-    return age > known_age or (
-        age == known_age and estimate.map_revision != known.map_revision
-    )

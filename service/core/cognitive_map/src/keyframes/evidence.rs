@@ -71,9 +71,9 @@ impl Chance {
         })
     }
 
-    /// The log-density in space where a closure leads, where it is known but for a covariance, about
-    /// the body axes there, what lies where: any heading, and no more tilted than places of the map
-    /// are. `None` if that is no covariance.
+    /// The log-density in space where a closure leads, where it is known but for a covariance about
+    /// the body axes there what lies where: any heading, and no more tilted than places of the map.
+    /// `None` if that is no covariance.
     ///
     /// Displacements are about the axes of the map, with z and the tilts first: those across a map
     /// may be ten orders of magnitude larger.

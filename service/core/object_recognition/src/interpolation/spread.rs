@@ -22,12 +22,12 @@ impl Spread {
     /// By how many visits made a place of their own. A finger that rests or slides makes many
     /// contacts on one visit.
     ///
-    /// Let a share e of the visits fall evenly over the surface, and the others on places. One makes
-    /// a new place if it is farther than a spacing from all others. Of the even ones it is the share
-    /// q of the surface that lies so far from its places. Of all n visits it is u = n₁/n, where n₁
-    /// places have one visit only (Good 1953, The population frequencies of species and the
-    /// estimation of population parameters). So e = u/q. One place more is counted in n₁, so that
-    /// few visits do not tell that none falls between.
+    /// Let a share e of the visits fall evenly over the surface, and the others on places. One
+    /// makes a new place if it is farther than a spacing from all others. Of the even ones it is
+    /// the share q of the surface that lies so far from its places. Of all n visits it is
+    /// u = n₁/n, where n₁ places have one visit only (Good 1953, The population frequencies of
+    /// species and the estimation of population parameters). So e = u/q. One place more is counted
+    /// in n₁, so that few visits do not tell that none falls between.
     ///
     /// Contacts that fall evenly give e = 1 while places are few. Then it falls, since a new place
     /// in a small gap takes the contacts beside it too: so a surface that is covered tells nothing.

@@ -1,5 +1,5 @@
-//! Log-odds of the sequences about two views: √n times the mean of the pairs that they meet in, where
-//! n is the length of a whole sequence, the better of both directions of travel.
+//! Log-odds of the sequences about two views: √n times the mean of the pairs that they meet in,
+//! where n is the length of a whole sequence, the better of both directions of travel.
 
 use nalgebra::DMatrix;
 
@@ -39,8 +39,8 @@ pub(super) fn of_all(runs: &Runs<'_>, log_odds: &DMatrix<f32>) -> DMatrix<f32> {
     odds
 }
 
-/// Of all pairs of views that are matched, where there are others between them: the sequences are of
-/// neighbours among all, whose `components` a row holds. `score` compares some with others.
+/// Of all pairs of views that are matched, where there are others between them: the sequences are
+/// of neighbours among all, whose `components` a row holds. `score` compares some with others.
 pub(super) fn of_thinned(
     neighbours: &Neighbours<'_>,
     components: &DMatrix<f64>,
