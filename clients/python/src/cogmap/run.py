@@ -439,8 +439,8 @@ class Run:
         with self.changed:
             is_outdated = self.window.is_outdated(estimate.term)
             known = self.estimate
-        is_news = known is None or is_news(estimate, known)
-        return not is_outdated and estimate.session == self.session_id and is_news
+        is_later = known is None or is_news(estimate, known)
+        return not is_outdated and estimate.session == self.session_id and is_later
 
     def _take_estimate(self, estimate: Estimate) -> None:
         with self.changed:
