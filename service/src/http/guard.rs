@@ -25,6 +25,7 @@ use super::hosts::HostRule;
 use super::problem::{Kind, Problem};
 use super::settings::HttpSettings;
 use super::token::Token;
+use super::unread::lend;
 use crate::metrics::{HTTP_REQUEST_SECONDS, HTTP_REQUESTS};
 
 /// Paths that need no token and are answered however much is under way.
@@ -205,6 +206,8 @@ where
         let route = request.extensions().get::<MatchedPath>().cloned();
         let guard = self.guard.clone();
         let admitted = guard.admit(&request);
+        let (request, rest) = lend(request);
+        // The body of a refused request is given back here.
         let admitted = admitted.map(|permit| (permit, self.inner.call(request)));
         Box::pin(async move {
             let response = match admitted {
@@ -219,7 +222,7 @@ where
                 let status = response.status().as_u16();
                 tracing::debug!(%method, path, status, seconds, "answered");
             }
-            Ok(response)
+            Ok(rest.settle(response).await)
         })
     }
 }

@@ -54,6 +54,7 @@ mod token;
 mod tracking;
 mod trajectory;
 mod trips;
+mod unread;
 
 use std::future::{Future, IntoFuture};
 use std::io;

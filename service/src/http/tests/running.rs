@@ -275,3 +275,51 @@ async fn where_no_connection_waits_the_next_one_does() {
     read_until(&mut second, "\"ok\"").await;
     drop((running.stop, rig.stop.clone()));
 }
+
+/// The head of a request that names no agent, and says how long a body follows.
+fn misnamed(length: usize, more: &str) -> String {
+    format!(
+        "POST /v1/spaces/default/agents/.ada/samples HTTP/1.1\r\nhost: localhost\r\n\
+        content-type: application/json\r\n{more}content-length: {length}\r\n\r\n"
+    )
+}
+
+/// What comes back for a head and a body that is sent a little later, and the connection.
+async fn answer_of(running: &Running, head: &str, body: &[u8]) -> (String, TcpStream) {
+    let mut stream = TcpStream::connect(running.address)
+        .await
+        .expect("it listens");
+    stream.write_all(head.as_bytes()).await.expect("sent");
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    stream.write_all(body).await.expect("sent");
+    let answer = read_until(&mut stream, "invalid-path").await;
+    (answer, stream)
+}
+
+#[tokio::test]
+async fn a_refused_request_does_not_end_the_connection_under_the_next_one() {
+    let rig = rig();
+    let running = run_on(&rig, settings()).await;
+    for length in [1, 1000, 300_000] {
+        let (answer, mut stream) =
+            answer_of(&running, &misnamed(length, ""), &vec![b' '; length]).await;
+        assert!(answer.starts_with("HTTP/1.1 400"), "{answer}");
+        assert!(!answer.contains("connection: close"), "{answer}");
+        let next = "GET /healthz HTTP/1.1\r\nhost: localhost\r\n\r\n";
+        stream.write_all(next.as_bytes()).await.expect("sent");
+        read_until(&mut stream, "HTTP/1.1 200").await;
+    }
+}
+
+#[tokio::test]
+async fn a_refused_request_whose_body_does_not_come_is_answered_and_ends_its_connection() {
+    let rig = rig();
+    let running = run_on(&rig, settings()).await;
+    for more in ["", "expect: 100-continue\r\n"] {
+        let (answer, mut stream) = answer_of(&running, &misnamed(1000, more), b"").await;
+        assert!(answer.starts_with("HTTP/1.1 400"), "{answer}");
+        assert!(answer.contains("connection: close"), "{answer}");
+        let mut rest = Vec::new();
+        stream.read_to_end(&mut rest).await.expect("it ends");
+    }
+}
