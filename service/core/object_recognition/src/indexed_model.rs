@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use crate::index::packed_places::PackedPlaces;
 use crate::indexed_place::IndexedPlace;
-use crate::interpolation::{Fields, LinkGraph, OpenRegion, Spread, interpolated};
+use crate::interpolation::{Fields, LinkGraph, OpenRegion, Spread, interpolated, missed_share};
 use crate::level_prior::{LevelPrior, level_prior};
 use crate::model::{LevelMemory, ObjectModel};
 use crate::numeric::{centroid, floor_u32};
@@ -27,6 +27,8 @@ pub(crate) struct IndexedModel {
     pub(crate) gap_m: f64,
     /// Standard deviation of what was predicted between the places \[m\]; none where nothing was.
     pub(crate) between_sd_m: Option<f64>,
+    /// Where contacts fell on places alone: probability that one is with a place that was missed.
+    pub(crate) missed_share: Option<f64>,
     /// Distributions of its levels, by channel.
     pub(crate) own_levels: Vec<LevelPrior>,
     /// Where it goes on beyond what was felt; none of one that was felt all over.
@@ -90,6 +92,7 @@ impl IndexedModel {
             extent_m,
             gap_m: graph.typical_m,
             between_sd_m: between_sd_m(&places),
+            missed_share: (spread == Spread::OnPlaces).then(|| missed_share(model.places())),
             own_levels: level_prior(places.iter().flat_map(|place| &place.levels)),
             places,
         }

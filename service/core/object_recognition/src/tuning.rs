@@ -167,6 +167,9 @@ pub(crate) const ERROR_NEIGHBOURS: usize = 6;
 /// anywhere have a share from a third to one, those that reach for the same points again less than
 /// a tenth. Chosen.
 pub(crate) const EVEN_SHARE_MIN: f64 = 0.25;
+/// Prior probability that an object which was taught at the same points again is felt elsewhere
+/// too. Chosen.
+pub(crate) const ELSEWHERE_PRIOR: f64 = 0.1;
 /// Nodes and places of a model: a model with more places has no nodes. Budget.
 pub(crate) const NODES_MAX: usize = 1024;
 /// Typical link of a surface, in spacings, up to which it needs no nodes: places that are kept

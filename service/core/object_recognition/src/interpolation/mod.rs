@@ -19,4 +19,4 @@ mod taken;
 pub(crate) use graph::LinkGraph;
 pub(crate) use nodes::{Fields, interpolated};
 pub(crate) use open::{OpenRegion, Part};
-pub(crate) use spread::Spread;
+pub(crate) use spread::{Spread, missed_share};

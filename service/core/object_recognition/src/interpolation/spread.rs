@@ -33,7 +33,7 @@ impl Spread {
     /// in a small gap takes the contacts beside it too: so a surface that is covered tells nothing.
     pub(crate) fn learned(places: &[ModelPlace], graph: &LinkGraph, spacing_m: f64) -> Self {
         let visits: f64 = places.iter().map(|place| place.visits).sum();
-        let single = places.iter().filter(|place| place.visits < 1.5).count() as f64;
+        let single = places.iter().filter(|place| place.is_single()).count() as f64;
         let uncovered = uncovered_share(places, graph, spacing_m);
         let is_covered = uncovered < UNEXPLORED_MIN;
         if !is_covered && single + 1.0 < EVEN_SHARE_MIN * uncovered * visits {
@@ -42,6 +42,14 @@ impl Spread {
             Self::Even
         }
     }
+}
+
+/// Probability that a contact with one of the points at which an object is felt is with none of
+/// those that were learned: about as many were never visited as were visited once (Good 1953). One
+/// place more is counted on both sides, so that few do not tell that none is missing.
+pub(crate) fn missed_share(places: &[ModelPlace]) -> f64 {
+    let single = places.iter().filter(|place| place.is_single()).count();
+    (single as f64 + 1.0) / (places.len() as f64 + 2.0)
 }
 
 /// Share of the surface, or of the curve, that lies farther than a spacing from every place.

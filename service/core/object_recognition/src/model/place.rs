@@ -87,6 +87,11 @@ impl ModelPlace {
         contact
     }
 
+    /// Whether one visit made it.
+    pub(crate) fn is_single(&self) -> bool {
+        self.visits < 1.5
+    }
+
     pub(crate) fn of(contact: &Contact) -> Self {
         let normals = contact.normal.map_or(Vector3::zeros(), Unit::into_inner);
         let level = |reading: &LevelReading| LevelMemory {

@@ -10,14 +10,10 @@ use crate::numeric::log_sum;
 use crate::orientation::Orientation;
 use crate::poses::PoseHypotheses;
 use crate::posterior::{Posterior, entropy_nats};
-use crate::recognition::dependence::evidence_share;
 use crate::recognition::likelihoods::{unknown_fit_log, walk_log};
 use crate::surfels::map::SurfelMap;
 use crate::translations::GaussianSum;
-use crate::tuning::{
-    CONTACTS_MAX, EARNED_MAX, ERROR_REACH, LISTED_SHARE_MIN, REACH_PER_STEP, RIVALS_MAX,
-    UNKNOWN_ERROR_REACH, UNKNOWN_PRIOR,
-};
+use crate::tuning::{CONTACTS_MAX, LISTED_SHARE_MIN, REACH_PER_STEP, RIVALS_MAX, UNKNOWN_PRIOR};
 
 /// The state of one episode of recognition.
 ///
@@ -185,43 +181,6 @@ impl Recognition {
             fit,
             answer_probability: library.answer_probability(),
         }
-    }
-
-    /// Log-likelihood of an unknown object by independent contacts; `unknown` is that by all.
-    ///
-    /// Contacts in one gap of a model share its errors. So the lead of an unknown object over a
-    /// known one, or of the best known one over it, counts as that of fewer contacts. Over the best
-    /// one an unknown object leads by the least of its leads over the likeliest. The odds between
-    /// known objects stay as they are.
-    fn earned(&self, library: &ObjectLibrary, objects: &[(ObjectId, f64)], unknown: f64) -> f64 {
-        let Hypotheses::Translations(translations) = &self.hypotheses else {
-            return unknown;
-        };
-        let share = |object: ObjectId, reach: f64| {
-            let indexed = library.indexed(object)?;
-            if indexed.between_sd_m.is_none() {
-                return Some(1.0);
-            }
-            let heaviest = translations.heaviest(object, 1);
-            let pose = heaviest.first()?.pose(&translations.rotations);
-            Some(evidence_share(indexed, &pose, &self.contacts, reach))
-        };
-        let mut likeliest: Vec<_> = objects.iter().filter(|own| own.1.is_finite()).collect();
-        likeliest.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let Some(&&(best, best_log)) = likeliest.first() else {
-            return unknown;
-        };
-        if unknown <= best_log {
-            let share = share(best, ERROR_REACH).unwrap_or(1.0);
-            return best_log + share * (unknown - best_log);
-        }
-        let leads = likeliest
-            .iter()
-            .take(EARNED_MAX)
-            .filter_map(|(object, log)| {
-                Some(share(*object, UNKNOWN_ERROR_REACH)? * (unknown - log))
-            });
-        best_log + leads.fold(unknown - best_log, f64::min)
     }
 
     /// Whether there is no hypothesis yet.

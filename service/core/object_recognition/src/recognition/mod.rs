@@ -3,6 +3,7 @@
 mod dependence;
 mod episode;
 mod explanation;
+mod gaps;
 mod likelihoods;
 mod masses;
 mod unknown;

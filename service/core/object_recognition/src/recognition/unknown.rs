@@ -2,10 +2,12 @@
 
 use std::f64::consts::{FRAC_PI_6, PI};
 
-use crate::library::ObjectLibrary;
+use crate::library::{ObjectId, ObjectLibrary};
+use crate::recognition::dependence::evidence_share;
 use crate::recognition::episode::Hypotheses;
 use crate::recognition::episode::Recognition;
-use crate::tuning::MISS_PER_CONTACT;
+use crate::recognition::gaps::told_by_gaps;
+use crate::tuning::{EARNED_MAX, ERROR_REACH, MISS_PER_CONTACT, UNKNOWN_ERROR_REACH};
 
 impl Recognition {
     /// Probability that the right pose in a learned model is not among the hypotheses. The contacts
@@ -45,5 +47,55 @@ impl Recognition {
                 -found - drawn - self.count as f64 * (4.0 * PI).ln() + aimed
             }
         }
+    }
+
+    /// Log-likelihood of an unknown object by independent contacts; `unknown` is that by all.
+    ///
+    /// Contacts in one gap of a model share its errors. So the lead of an unknown object over a
+    /// known one, or of the best known one over it, counts as that of fewer contacts. Over the best
+    /// one an unknown object leads by the least of its leads over the likeliest. The odds between
+    /// known objects stay as they are.
+    ///
+    /// Of an object whose contacts fell on places alone, what [`told_by_gaps`] adds to a lead takes
+    /// an answer away, but calls nothing unknown: at a place that was missed a known object is
+    /// named late rather than called unknown.
+    pub(super) fn earned(
+        &self,
+        library: &ObjectLibrary,
+        objects: &[(ObjectId, f64)],
+        unknown: f64,
+    ) -> f64 {
+        let Hypotheses::Translations(translations) = &self.hypotheses else {
+            return unknown;
+        };
+        // By contacts that are independent as far as a model's errors reach, in typical links.
+        let lead = |&(object, log): &(ObjectId, f64), reach: f64| {
+            let lead = unknown - log;
+            let indexed = library.indexed(object)?;
+            let heaviest = || translations.heaviest(object, 1).first().copied();
+            if let Some(missed_share) = indexed.missed_share {
+                let told = told_by_gaps(heaviest()?.falls, missed_share);
+                let most = if told > 0.0 { lead.max(0.0) } else { lead };
+                return Some((lead + told).min(most));
+            }
+            if indexed.between_sd_m.is_none() {
+                return Some(lead);
+            }
+            let pose = heaviest()?.pose(&translations.rotations);
+            Some(lead * evidence_share(indexed, &pose, &self.contacts, reach))
+        };
+        let mut likeliest: Vec<_> = objects.iter().filter(|own| own.1.is_finite()).collect();
+        likeliest.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let Some(best) = likeliest.first() else {
+            return unknown;
+        };
+        let over_best = unknown - best.1;
+        let earned = lead(best, ERROR_REACH).unwrap_or(over_best);
+        if earned <= 0.0 {
+            return best.1 + earned;
+        }
+        let leads =
+            { likeliest.iter().take(EARNED_MAX) }.filter_map(|own| lead(own, UNKNOWN_ERROR_REACH));
+        best.1 + leads.fold(over_best, f64::min)
     }
 }

@@ -21,6 +21,20 @@ pub(crate) struct TranslationHypothesis {
     pub(crate) variance_m2: f64,
     /// Log-likelihood of the contacts so far, with the factor for the object's size.
     pub(crate) evidence: f64,
+    /// Where the contacts after the first fell.
+    pub(crate) falls: Falls,
+}
+
+/// Expected numbers of contacts with a model whose contacts fell on places alone.
+///
+/// A contact counts on both sides by its probabilities, as in a quasi-Bayes procedure (Makov &
+/// Smith 1977, A quasi-Bayes unsupervised learning procedure for priors).
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Falls {
+    /// In gaps between places.
+    pub(crate) gaps: f32,
+    /// On places.
+    pub(crate) places: f32,
 }
 
 impl TranslationHypothesis {

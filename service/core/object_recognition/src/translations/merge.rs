@@ -1,7 +1,8 @@
 //! Merging: hypotheses of one cell become one, with the moments of all.
 
 use crate::library::ObjectId;
-use crate::translations::hypothesis::{CELL_BITS, TranslationHypothesis};
+use crate::numeric::to_f32;
+use crate::translations::hypothesis::{CELL_BITS, Falls, TranslationHypothesis};
 
 /// Merges hypotheses of one object, rotation and cell, and sorts by these.
 pub(crate) fn merged(all: &[TranslationHypothesis]) -> Vec<TranslationHypothesis> {
@@ -37,7 +38,7 @@ pub(crate) fn merged(all: &[TranslationHypothesis]) -> Vec<TranslationHypothesis
     sums
 }
 
-/// One hypothesis with the mass, the mean and the variance of several of one map.
+/// One hypothesis with the mass, the mean, the variance and the mean falls of several of one map.
 fn sum<'a>(
     mut all: impl ExactSizeIterator<Item = &'a TranslationHypothesis> + Clone,
 ) -> Option<TranslationHypothesis> {
@@ -50,6 +51,7 @@ fn sum<'a>(
         .map(|own| own.evidence)
         .fold(f64::NEG_INFINITY, f64::max);
     let (mut mass, mut mean, mut square, mut variance) = (0.0, first.translation * 0.0, 0.0, 0.0);
+    let (mut gaps, mut places) = (0.0, 0.0);
     for own in others {
         let weight = (own.evidence - most).exp();
         // From the first one, so that no digits are lost.
@@ -58,6 +60,8 @@ fn sum<'a>(
         mean += weight * apart;
         square += weight * apart.norm_squared();
         variance += weight * own.variance_m2;
+        gaps += weight * f64::from(own.falls.gaps);
+        places += weight * f64::from(own.falls.places);
     }
     mean /= mass;
     let spread = (square / mass - mean.norm_squared()).max(0.0);
@@ -65,6 +69,10 @@ fn sum<'a>(
         translation: first.translation + mean,
         variance_m2: variance / mass + spread / 3.0,
         evidence: most + mass.ln(),
+        falls: Falls {
+            gaps: to_f32(gaps / mass),
+            places: to_f32(places / mass),
+        },
         ..first
     })
 }
@@ -82,6 +90,7 @@ mod tests {
             translation: Vector3::new(x, -1.0, 0.0),
             variance_m2: 1e-6,
             evidence,
+            falls: Falls::default(),
         }
     }
 

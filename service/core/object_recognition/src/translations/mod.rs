@@ -13,4 +13,4 @@ mod touch_update;
 mod unexplored;
 
 pub(crate) use gaussian_sum::GaussianSum;
-pub(crate) use hypothesis::TranslationHypothesis;
+pub(crate) use hypothesis::{Falls, TranslationHypothesis};

@@ -12,7 +12,7 @@ use crate::index::packed_places::PackedPlaces;
 use crate::library::{LibraryEntry, ObjectId};
 use crate::numeric::{exp, to_f32};
 use crate::percept_likelihood::{ContactPercepts, PerceptLikelihood};
-use crate::translations::hypothesis::TranslationHypothesis;
+use crate::translations::hypothesis::{Falls, TranslationHypothesis};
 use crate::translations::touch_update::{TouchUpdate, share};
 use crate::tuning::{GAIN_MAX, LIVE_SEEDS_RATIO};
 
@@ -229,6 +229,7 @@ impl PrefilterGroup {
             translation: place.position.coords - rotation * contact.position_m.coords,
             variance_m2: contact.variance_m2() + place.variance_m2,
             evidence: (self.each * f64::from(likelihood)).ln(),
+            falls: Falls::default(),
         }
     }
 

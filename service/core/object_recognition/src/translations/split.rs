@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, UnitQuaternion};
 
 use crate::indexed_model::IndexedModel;
+use crate::numeric::to_f32;
 use crate::percept_likelihood::PerceptLikelihood;
 use crate::translations::candidates::{Candidate, CandidateSearch};
 use crate::translations::hypothesis::TranslationHypothesis;
@@ -43,9 +44,17 @@ impl SplitBuffers {
         let densities =
             (self.search).candidates(&indexed.packed, &point, variances, local, candidates);
         let one = share(indexed.places.len()) / TAU.powf(1.5);
-        let beyond = touch.beyond(hypothesis.object, indexed, &point, one * densities);
+        let unpredicted = touch.unpredicted(hypothesis.object, indexed, &point, one * densities);
+        let beyond = unpredicted.map_or(0.0, |own| own.density);
         let outlier = (touch.outlier + beyond) / one;
         let total = outlier + densities;
+        let mut falls = hypothesis.falls;
+        if let Some(own) = unpredicted.filter(|_| indexed.missed_share.is_some()) {
+            falls.places += to_f32(densities / total);
+            if own.is_gap {
+                falls.gaps += to_f32(beyond / (one * total));
+            }
+        }
         let least = SPLIT_SHARE_MIN * total;
         candidates.retain(|candidate| candidate.density >= least);
         if candidates.len() > SPLIT_MAX {
@@ -58,6 +67,7 @@ impl SplitBuffers {
             parts.push(TranslationHypothesis {
                 variance_m2: prior,
                 evidence,
+                falls,
                 ..*hypothesis
             });
             return;
@@ -76,6 +86,7 @@ impl SplitBuffers {
                 translation: hypothesis.translation + gain * *apart,
                 variance_m2: prior - gain * prior,
                 evidence: evidence + (*density / sum).ln(),
+                falls,
                 ..*hypothesis
             });
         }

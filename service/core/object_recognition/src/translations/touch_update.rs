@@ -32,6 +32,15 @@ pub(crate) struct UnpredictedDensity {
     pub(crate) open: f64,
 }
 
+/// A touch of what a model does not predict.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Unpredicted {
+    /// Its density times its share \[1/m³\].
+    pub(crate) density: f64,
+    /// Whether it is in a gap between places.
+    pub(crate) is_gap: bool,
+}
+
 impl<'a> TouchUpdate<'a> {
     /// Of a contact and the one before it.
     pub(crate) fn new(
@@ -47,30 +56,34 @@ impl<'a> TouchUpdate<'a> {
         }
     }
 
-    /// Density of the touch at a point, if it is one of what the model of an object does not
-    /// predict; `explored` is that of what it does.
-    pub(crate) fn beyond(
+    /// The touch at a point, if it is one of what the model of an object does not predict;
+    /// `explored` is the density of what it does. None where nothing is known of that.
+    pub(crate) fn unpredicted(
         &self,
         object: ObjectId,
         indexed: &IndexedModel,
         point: &Point3<f64>,
         explored: f64,
-    ) -> f64 {
+    ) -> Option<Unpredicted> {
         let density = self.unexplored.get(&object);
-        let density = density.filter(|density| explored < density.gap.max(density.open));
-        let Some((density, open)) = density.zip(indexed.open.as_ref()) else {
-            return 0.0;
-        };
-        let (share, density) = match open.part(point) {
+        let (density, open) = density.zip(indexed.open.as_ref())?;
+        if explored >= density.gap.max(density.open) {
+            return Some(Unpredicted::default());
+        }
+        let part = open.part(point);
+        let (share, density) = match part {
             Part::Known => (0.0, 0.0),
             Part::Gap => (open.unexpected, density.gap),
             Part::Beyond => (1.0, density.open),
         };
-        if explored < density {
-            share * density
-        } else {
-            0.0
-        }
+        Some(Unpredicted {
+            density: if explored < density {
+                share * density
+            } else {
+                0.0
+            },
+            is_gap: part == Part::Gap,
+        })
     }
 }
 

@@ -9,7 +9,7 @@ use crate::level_prior::likelihood_below_one;
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::numeric::log_sum;
 use crate::translations::background::UnknownContact;
-use crate::translations::hypothesis::TranslationHypothesis;
+use crate::translations::hypothesis::{Falls, TranslationHypothesis};
 use crate::translations::touch_update::UnpredictedDensity;
 use crate::tuning::{ENTER_MIN, PREFILTER_CONTACTS_MAX};
 
@@ -109,6 +109,7 @@ impl Unexplored {
                         translation: place.position.coords - turn * contact.position_m.coords,
                         variance_m2: contact.variance_m2() + place.variance_m2 + open.entry_m2(),
                         evidence,
+                        falls: Falls::default(),
                     });
                 }
             }

@@ -40,6 +40,22 @@ fn two_objects_are_told_apart_in_fewer_touches_than_the_paper_needs() {
 }
 
 #[test]
+fn few_turned_strangers_are_taken_for_an_object() {
+    let report = run(
+        &ObjectProtocol {
+            rotate: Rotate::Cube,
+            trials: 100,
+            ..small()
+        },
+        2,
+    );
+    let outcomes = report.outcomes.unwrap();
+    assert!(outcomes.accuracy >= 0.98, "{outcomes:?}");
+    let named = report.false_known_rate.unwrap();
+    assert!(named <= 0.2, "{named}");
+}
+
+#[test]
 fn outcomes_do_not_depend_on_the_number_of_threads() {
     let protocol = ObjectProtocol {
         trials: 6,
