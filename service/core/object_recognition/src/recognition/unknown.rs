@@ -74,7 +74,8 @@ impl Recognition {
             let indexed = library.indexed(object)?;
             let heaviest = || translations.heaviest(object, 1).first().copied();
             if let Some(missed_share) = indexed.missed_share {
-                let told = told_by_gaps(heaviest()?.falls, missed_share);
+                let falls = heaviest().map(|own| own.falls).unwrap_or_default();
+                let told = told_by_gaps(falls, missed_share);
                 let most = if told > 0.0 { lead.max(0.0) } else { lead };
                 return Some((lead + told).min(most));
             }
