@@ -47,35 +47,67 @@ impl Estimator {
         external: &ExternalEstimate,
         effects: &mut Vec<Effect>,
     ) -> bool {
-        let Some(number) = self.frame_of(agent) else {
-            return false;
-        };
         if !is_somewhere(&external.pose.translation.vector) {
             return false;
         }
+        self.alter(agent, effects, |frame, index, parameters| {
+            frame.fuse(index, external, parameters)
+        })
+    }
+
+    /// An agent of the map is where another estimate has it, which rests upon all that the present
+    /// one does; its error on the right has this covariance. It is no longer correlated with
+    /// anything.
+    pub fn settle(
+        &mut self,
+        agent: u32,
+        pose: &Isometry3<f64>,
+        covariance: &PoseCovariance,
+        effects: &mut Vec<Effect>,
+    ) {
+        let is_known = covariance.matrix().iter().all(|entry| entry.is_finite());
+        if is_known && is_somewhere(&pose.translation.vector) {
+            self.alter(agent, effects, |frame, index, _| {
+                frame.settle(index, pose, covariance.matrix());
+                true
+            });
+        }
+    }
+
+    /// Alters an agent in its frame, or by itself where it is detached; answers what `alter` does,
+    /// with `false` meaning that nothing has changed.
+    fn alter(
+        &mut self,
+        agent: u32,
+        effects: &mut Vec<Effect>,
+        alter: impl FnOnce(&mut Frame, usize, &Parameters) -> bool,
+    ) -> bool {
+        let Some(number) = self.frame_of(agent) else {
+            return false;
+        };
         if let Some(detached) = &mut self.slot_mut(agent).detached {
             let state = Arc::clone(&detached.state);
             let mut alone = Frame::default();
             alone.join(agent, state);
-            let is_taken = alone.fuse(0, external, &self.parameters);
+            let is_altered = alter(&mut alone, 0, &self.parameters);
             if let Some(state) = alone.leave(agent)
-                && is_taken
+                && is_altered
                 && let Some(detached) = &mut self.slot_mut(agent).detached
             {
                 detached.state = state;
                 // The outside estimate may rest upon what the others saw.
                 detached.was_joint = true;
             }
-            return is_taken;
+            return is_altered;
         }
         let Some(frame) = self.frames.get_mut(number, 0) else {
             return false;
         };
-        let is_taken = frame
+        let is_altered = frame
             .member(agent)
-            .is_some_and(|index| frame.fuse(index, external, &self.parameters));
+            .is_some_and(|index| alter(frame, index, &self.parameters));
         self.sweep(number, effects);
-        is_taken
+        is_altered
     }
 }
 
@@ -154,6 +186,17 @@ impl Frame {
             .state_mut()
             .filter
             .set_calibration(&calibration, parameters);
+        self.tell_members();
+    }
+
+    /// Puts a member where another estimate has it, with a covariance of its own.
+    fn settle(&mut self, index: usize, pose: &Isometry3<f64>, covariance: &Matrix6<f64>) {
+        self.flush();
+        let member = &mut self.members[index];
+        member.state_mut().filter.pose = *pose;
+        let offset = member.offset;
+        self.covariance.isolate(offset, &covariance.diagonal());
+        self.covariance.set_diagonal(offset, &symmetric(covariance));
         self.tell_members();
     }
 

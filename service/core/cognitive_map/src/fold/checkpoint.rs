@@ -55,8 +55,9 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// past that is relaxed by sightings, version 15 no cells of mean views and no count of keyframes
 /// that are new, version 16 no past that is held by live estimates, version 17 no searches by
 /// levels at four nodes, version 18 no trial of the noise of odometry, version 19 no
-/// veer in the estimate, version 20 no rotation as read beside a motion.
-const VERSION: u16 = 22;
+/// veer in the estimate, version 20 no rotation as read beside a motion, version 21 no visits of
+/// places of objects, version 22 no views of maps and nobody tracked among them.
+const VERSION: u16 = 23;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

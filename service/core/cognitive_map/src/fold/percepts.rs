@@ -62,13 +62,26 @@ impl Fold<'_> {
                 self.keyframes.view(&view);
             }
             if !is_lost {
-                return;
+                return self.track(&view);
             }
         }
         let sd_max_m = self.settings.field_radius_m;
         if let Some(found) = self.keyframes.seek(&view, sd_max_m) {
             self.relocalised(&found);
         }
+    }
+
+    /// Corrects the pose of an agent that knows about where it is, by what it sees in a map that
+    /// views hold together.
+    fn track(&mut self, view: &View<'_>) {
+        let Some(tracked) = self.keyframes.track(view, self.stamp_ns) else {
+            return;
+        };
+        let (pose, covariance) = (&tracked.pose, &tracked.covariance);
+        self.estimator
+            .settle(self.agent_id.0, pose, covariance, &mut self.effects);
+        self.apply_effects();
+        self.update_pose();
     }
 
     /// Lets an agent that knows where it is teach what views say of cells, and finds one that does

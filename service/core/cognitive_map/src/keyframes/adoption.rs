@@ -126,6 +126,9 @@ impl KeyframeGraph {
         if let Some(learned) = &outcome.learned {
             self.learned = learned.clone().into();
         }
+        if let Some(view_maps) = &outcome.view_maps {
+            self.set_view_maps(view_maps.clone());
+        }
         for (agent, _) in (0..).zip(0..self.chains.tracks.len()) {
             self.move_latest(agent, outcome);
         }

@@ -16,7 +16,9 @@
 //! 11    page   up to 16 views of the log
 //! 12    page   up to 16 cells of mean views
 //! 13    page   up to 16 views that wait for their cells
-//! 14    page   the particles of an agent
+//! 14    page   the particles of an agent that does not know where it is
+//! 15    page   what was learned of a channel of views, with these views
+//! 16    page   the particles of an agent that is tracked
 //! ```
 
 use std::collections::BTreeMap;
@@ -40,7 +42,7 @@ macro_rules! of_graph {
 }
 
 /// The other parts, by number, from 1.
-const PARTS: [Stored; 14] = [
+const PARTS: [Stored; 16] = [
     of_graph!(chains.tracks),
     of_graph!(chains.keyframes.pages),
     of_graph!(sightings.slab.pages),
@@ -55,7 +57,13 @@ const PARTS: [Stored; 14] = [
     Stored::InRecognition(Part::Cells),
     Stored::InRecognition(Part::Waiting),
     Stored::InRecognition(Part::Filters),
+    of_graph!(view_maps),
+    Stored::InRecognition(Part::Trackers),
 ];
+
+/// The parts from this one on, counted from zero, are there only where there are views: without,
+/// a map has the digest that it had before there were such parts.
+const OF_VIEW_MAPS: usize = 14;
 
 /// Number of pending sightings at the end of the head: they are the estimator's.
 const N_PENDING: u64 = 0;
@@ -149,6 +157,10 @@ impl KeyframeMap {
             return Err(CorruptKeyframes);
         }
         graph.chains.rebuild_index();
+        let seen = &map.recognition;
+        if !map.view_maps().all(|views| seen.is_view_map(views)) {
+            return Err(CorruptKeyframes);
+        }
         Ok(map)
     }
 
@@ -181,8 +193,9 @@ impl KeyframeMap {
             pending.write_digested(&mut out);
             meanwhile.write(&mut out);
         }
-        for stored in &PARTS {
+        for (number, stored) in PARTS.iter().enumerate() {
             match stored {
+                _ if number >= OF_VIEW_MAPS && !has_views => {}
                 Stored::InGraph(vector, _) => vector(&self.graph).write_digests(&mut out),
                 Stored::InRecognition(Part::Log) if !has_views => {}
                 Stored::InRecognition(Part::Cells | Part::Waiting | Part::Filters)

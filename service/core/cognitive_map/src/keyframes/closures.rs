@@ -169,6 +169,7 @@ impl KeyframeGraph {
         let mut coarse = RelaxationCopy::coarse(self);
         let is_matched = views.is_some_and(|log| coarse.match_views(log, live_matching(log)));
         self.learned = Arc::clone(&coarse.graph().learned);
+        self.view_maps = coarse.graph().view_maps.clone();
         if !is_due && !is_matched {
             return Vec::new(); // closures wait for their own time
         }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector6};
-use place_recognition::{LearnedChannel, ViewMatch};
+use place_recognition::{LearnedChannel, ViewMap, ViewMatch};
 
 use super::agent_track::{AgentTrack, is_level};
 use super::attachments::Attachments;
@@ -20,7 +20,7 @@ use super::tuning;
 use crate::estimator::Calibrated;
 use crate::input::StartPose;
 use geometry::PoseCovariance;
-use state::NONE;
+use state::{NONE, PagedVec};
 
 /// The keyframe graph: the past motions and sightings of all agents, to be smoothed.
 ///
@@ -41,6 +41,8 @@ pub struct KeyframeGraph {
     pub(super) matches: ViewMatches,
     /// What was learned of the channels of views when they were last matched.
     pub(super) learned: Arc<[LearnedChannel]>,
+    /// The views of each of these channels where the latest relaxation has them.
+    pub(super) view_maps: PagedVec<ViewMap, 1>,
     /// Places that keep their pose relative to a keyframe.
     pub(super) attachments: Attachments,
     /// What has come since a relaxation began that is under way.
@@ -58,6 +60,7 @@ impl KeyframeGraph {
             constraints: Constraints::default(),
             matches: ViewMatches::default(),
             learned: Arc::default(),
+            view_maps: PagedVec::default(),
             attachments: Attachments::default(),
             meanwhile: None,
         }

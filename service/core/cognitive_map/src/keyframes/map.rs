@@ -109,6 +109,7 @@ impl KeyframeMap {
     pub fn is_contradicted(&mut self, view: &View<'_>, accepted: u64) -> bool {
         let chains = &self.graph.chains;
         self.recognition.is_contradicted(view, accepted, chains)
+            && !self.recognition.is_tracked(view.sample)
     }
 
     /// An agent may be anywhere. What it saw since that is contradicted is forgotten where it was

@@ -73,6 +73,7 @@ mod sparsification;
 mod tuning;
 mod view_channel;
 mod view_matches;
+mod view_tracking;
 
 pub use checkpoint::{CorruptKeyframes, KeyframePage};
 pub use graph::KeyframeGraph;

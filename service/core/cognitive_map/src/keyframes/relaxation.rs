@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use place_recognition::LearnedChannel;
+use place_recognition::{LearnedChannel, ViewMap};
 
 use super::agent_track::AgentTrack;
 use super::constraint::{ClosureState, Constraint, composed};
@@ -125,6 +125,11 @@ impl RelaxationCopy {
     /// Replaces what was learned of the channels of views.
     pub(super) fn set_learned(&mut self, learned: Arc<[LearnedChannel]>) {
         self.graph.learned = learned;
+    }
+
+    /// Replaces what later views are compared with.
+    pub(super) fn set_view_maps(&mut self, view_maps: Vec<ViewMap>) {
+        self.graph.set_view_maps(view_maps);
     }
 
     /// Replaces the matches of views.

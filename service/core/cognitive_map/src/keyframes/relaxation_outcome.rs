@@ -1,7 +1,7 @@
 //! What a relaxation of the keyframe graph comes to.
 
 use nalgebra::Isometry3;
-use place_recognition::{LearnedChannel, ViewLog, ViewMatch};
+use place_recognition::{LearnedChannel, ViewLog, ViewMap, ViewMatch};
 
 use super::agent_track::AgentTrack;
 use super::constraint::{ClosureState, Constraint};
@@ -28,6 +28,8 @@ pub(super) struct RelaxationOutcome {
     pub(super) matches: Option<Vec<ViewMatch>>,
     /// What was learned of the channels of views, if that has changed.
     pub(super) learned: Option<Vec<LearnedChannel>>,
+    /// The views of the channels where they lie now, if that or what was learned has changed.
+    pub(super) view_maps: Option<Vec<ViewMap>>,
     /// The poses of the agents, as they were in the graph.
     pub(super) corrections: Vec<Correction>,
 }
@@ -51,6 +53,7 @@ impl RelaxationOutcome {
         };
         let tracks = { graph.chains.tracks.iter() }.zip(relaxed.chains.tracks.iter());
         let are_new = relaxed.matches != graph.matches;
+        let view_maps = relaxed.located_view_maps();
         let turn_noises = (0..).zip(tracks).filter_map(learned).collect();
         Self {
             turn_noises,
@@ -62,6 +65,7 @@ impl RelaxationOutcome {
                 .collect(),
             matches: are_new.then(|| relaxed.matches.to_vec()),
             learned: (relaxed.learned != graph.learned).then(|| relaxed.learned.to_vec()),
+            view_maps: (!view_maps.iter().eq(graph.view_maps.iter())).then_some(view_maps),
             corrections,
         }
     }
@@ -72,6 +76,7 @@ impl RelaxationOutcome {
             && self.states.is_empty()
             && self.turn_noises.is_empty()
             && self.matches.is_none()
+            && self.view_maps.is_none()
             && self.corrections.is_empty()
     }
 
@@ -122,6 +127,7 @@ impl State for RelaxationOutcome {
         write_list(self.turn_noises.iter(), out);
         self.matches.write(out);
         self.learned.write(out);
+        self.view_maps.write(out);
         write_list(self.corrections.iter(), out);
     }
 
@@ -130,12 +136,14 @@ impl State for RelaxationOutcome {
         let (poses, states) = (read_list(input, NONE)?, read_list(input, NONE)?);
         let turn_noises = read_list(input, NONE)?;
         let (matches, learned) = State::read(input)?;
+        let view_maps = State::read(input)?;
         Ok(Self {
             poses,
             states,
             turn_noises,
             matches,
             learned,
+            view_maps,
             corrections: read_list(input, NONE)?,
         })
     }

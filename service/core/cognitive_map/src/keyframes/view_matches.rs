@@ -38,6 +38,8 @@ impl RelaxationCopy {
     pub(super) fn match_views(&mut self, log: &ViewLog, matching: &Matching) -> bool {
         let channels = Similarity::of_channels(log, matching.views_max);
         self.set_learned(channels.iter().map(|channel| *channel.learned()).collect());
+        let view_maps = channels.iter().map(|channel| channel.view_map().clone());
+        self.set_view_maps(view_maps.collect());
         let ranges = channels.iter().map(|channel| channel.learned().range_m);
         let Some(range_m) = ranges.min_by(f64::total_cmp) else {
             return false;

@@ -20,7 +20,8 @@ mod levels; // where robots are by what they feel
 mod motion; // path integration against closed forms
 mod names; // landmarks that are called by other names
 mod objects; // what is taught and known again
-mod percepts; // what places learn of percepts, and what they predict
+mod percepts;
+mod place_cells; // what places learn of percepts, and what they predict
 mod places; // recruitment, revisits
 mod ranges; // distances alone
 mod readers; // routes after a replay, and on many threads

@@ -3,6 +3,7 @@
 use state::{CorruptState, PagedVec, State, StateReader, StateWriter, write_page};
 
 use super::PlaceRecognition;
+use crate::tuning::tracking::AGENTS_MAX;
 
 /// A paged part of the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,8 +22,10 @@ pub enum Part {
     Cells,
     /// Views that wait until they are added to cells, 16 a page.
     Waiting,
-    /// The particles of an agent.
+    /// The particles of an agent that does not know where it is.
     Filters,
+    /// The particles of an agent that is tracked.
+    Trackers,
 }
 
 /// Number of a page, and its bytes.
@@ -40,6 +43,7 @@ impl PlaceRecognition {
             Part::Cells => Box::new(pages_of(&self.waking.cells.all, since_revision)),
             Part::Waiting => Box::new(pages_of(&self.waking.waiting, since_revision)),
             Part::Filters => Box::new(pages_of(&self.waking.filters, since_revision)),
+            Part::Trackers => Box::new(pages_of(&self.trackers, since_revision)),
         }
     }
 
@@ -58,6 +62,7 @@ impl PlaceRecognition {
             Part::Cells => self.waking.cells.all.push_page(bytes, revision),
             Part::Waiting => self.waking.waiting.push_page(bytes, revision),
             Part::Filters => self.waking.filters.push_page(bytes, revision),
+            Part::Trackers => self.trackers.push_page(bytes, revision),
         }
     }
 
@@ -72,6 +77,7 @@ impl PlaceRecognition {
             Part::Cells => self.waking.cells.all.write_digests(out),
             Part::Waiting => self.waking.waiting.write_digests(out),
             Part::Filters => self.waking.filters.write_digests(out),
+            Part::Trackers => self.trackers.write_digests(out),
         }
     }
 
@@ -119,8 +125,12 @@ impl PlaceRecognition {
         let is_channel = |channel, length| self.views.is_channel(channel, length);
         let mut searches = self.searches.iter();
         let mut tests = self.kidnap_tests.iter();
+        let channels = self.views.channels.len();
+        let mut trackers = self.trackers.iter();
         self.views.is_sound(agents)
             && self.waking.is_sound(agents)
+            && self.trackers.len() <= AGENTS_MAX
+            && trackers.all(|tracker| tracker.is_sound(agents, channels))
             && searches.all(|search| search.is_sound(agents, is_channel))
             && tests.all(|test| test.is_sound(agents, is_channel))
     }

@@ -9,11 +9,15 @@ pub use bytes::Part;
 pub use relocalise::{Guess, Relocalised};
 pub use revisit::Revisit;
 
+use crate::keyframes::SampleKey;
 use crate::relocalisation::{KidnapTests, Searches};
 use crate::sequences::ViewMemory;
 use crate::similarity::ViewLog;
+use crate::tracking::{Tracked, Tracker, ViewMap};
+use crate::tuning::tracking::AGENTS_MAX;
 use crate::view::View;
 use crate::waking::{Found, Waking};
+use state::PagedVec;
 
 /// What agents have seen, and the searches of those that do not know where they are.
 ///
@@ -29,6 +33,8 @@ pub struct PlaceRecognition {
     kidnap_tests: KidnapTests,
     /// Mean views of cells, and the filters of agents that search among them.
     waking: Waking,
+    /// The particles of agents that know about where they are.
+    trackers: PagedVec<Tracker, 1>,
 }
 
 impl Default for PlaceRecognition {
@@ -40,6 +46,7 @@ impl Default for PlaceRecognition {
             searches: Searches::default(),
             kidnap_tests: KidnapTests::default(),
             waking: Waking::default(),
+            trackers: PagedVec::default(),
         }
     }
 }
@@ -82,9 +89,64 @@ impl PlaceRecognition {
         Some(due)
     }
 
+    /// Where an agent that knows about where it is, at a view that was remembered last, is among
+    /// those of maps; `None` if they do not say. `stamp_ns` is that of the sample.
+    pub fn track<'a>(
+        &mut self,
+        view: &View<'_>,
+        stamp_ns: i64,
+        mut maps: impl Iterator<Item = &'a ViewMap>,
+    ) -> Option<Tracked> {
+        let log = &self.views.log.views;
+        let last = log.get(log.len().checked_sub(1)?)?;
+        let logged = Some(last)
+            .filter(|last| last.sample == view.sample)?
+            .clone();
+        let map = maps.find(|map| map.channel() == logged.channel)?;
+        let revision = self.revision;
+        let number = self.tracker_of(view.sample.agent);
+        let is_same = { self.trackers.get(number) }
+            .is_some_and(|tracker| tracker.is_of(view.sample, logged.channel));
+        if !is_same {
+            let tracker = Tracker::new(view, stamp_ns, logged.channel);
+            match self.trackers.get_mut(number, revision) {
+                Some(slot) => *slot = tracker,
+                None => self.trackers.push(tracker, revision),
+            }
+        }
+        let tracker = self.trackers.get_mut(number, revision)?;
+        tracker.used = revision;
+        tracker.step(view, stamp_ns, &logged, map)
+    }
+
+    /// The number of an agent's tracker, or of the one in whose place it comes.
+    fn tracker_of(&self, agent: u32) -> usize {
+        let own = { self.trackers.iter() }.position(|one| one.agent == agent);
+        own.unwrap_or_else(|| {
+            if self.trackers.len() < AGENTS_MAX {
+                return self.trackers.len();
+            }
+            let used = self.trackers.iter().map(|one| one.used).enumerate();
+            used.min_by_key(|(_, used)| *used)
+                .map_or(0, |(number, _)| number)
+        })
+    }
+
+    /// Whether what an agent has seen lately fits a map where it is tracked.
+    pub fn is_tracked(&self, sample: SampleKey) -> bool {
+        let mut trackers = self.trackers.iter();
+        trackers.any(|tracker| tracker.fits(sample))
+    }
+
+    /// Whether what later views are compared with is of a channel that is there.
+    pub fn is_view_map(&self, map: &ViewMap) -> bool {
+        map.is_sound(self.views.logged_length(map.channel()))
+    }
+
     /// Bytes of memory that the views take.
     pub fn bytes(&self) -> usize {
-        self.views.bytes() + self.waking.bytes()
+        let particles: usize = self.trackers.iter().map(Tracker::bytes).sum();
+        self.views.bytes() + self.waking.bytes() + self.trackers.bytes() + particles
     }
 
     /// Learns from the view of an agent that knows where it is what views say of cells.

@@ -380,6 +380,12 @@ impl ViewMemory {
         model.is_some_and(|model| usize::from(model.dimension) == length)
     }
 
+    /// Numbers of a view of a channel, as it is logged.
+    pub(crate) fn logged_length(&self, channel: u8) -> Option<usize> {
+        let model = self.channels.get(usize::from(channel))?;
+        Some(usize::from(model.dimension).min(crate::tuning::log::NUMBERS_MAX))
+    }
+
     /// Whether everything that it names is there, and all views of a channel are of one length.
     pub(crate) fn is_sound(&self, agents: usize) -> bool {
         let is_channel = |channel: u8, length: usize| self.is_channel(channel, length);

@@ -11,9 +11,9 @@ use crate::tuning::similarity as tuning;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Centres {
     /// The mean of all views.
-    whole: RowDVector<f64>,
+    pub(super) whole: RowDVector<f64>,
     /// Those of long sessions, by agent and session.
-    own: Vec<((u32, u32), RowDVector<f64>)>,
+    pub(super) own: Vec<((u32, u32), RowDVector<f64>)>,
 }
 
 impl Centres {

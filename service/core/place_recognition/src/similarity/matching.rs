@@ -11,6 +11,7 @@ use super::sequence_odds;
 use super::two_covariance::{TwoCovariance, single};
 use super::view_log::ViewLog;
 use crate::keyframes::SampleKey;
+use crate::tracking::{ReferenceView, SessionCentre, ViewMap, ViewModel};
 use crate::tuning::similarity as tuning;
 use state::state_of_struct;
 
@@ -49,6 +50,9 @@ pub struct Similarity<'a> {
     log_odds: DMatrix<f32>,
     /// The same of whole sequences of views.
     of_sequences: DMatrix<f32>,
+    view_map: ViewMap,
+    /// Part of the channel's views that are matched.
+    share: f64,
 }
 
 impl<'a> Similarity<'a> {
@@ -73,7 +77,8 @@ impl<'a> Similarity<'a> {
         let within = neighbours.within(&views, runs.len())?;
         let model = TwoCovariance::of(within, &neighbours.of_matched(&views))?;
         let components = model.components(&views);
-        let (scores, score_sd) = model.scores(&neighbours.of_matched(&components));
+        let matched = neighbours.of_matched(&components);
+        let (scores, score_sd) = model.scores(&matched);
         let pairs = neighbours.pairs(&model, &components, score_sd);
         let learned = Learned::of(&runs, &pairs, scores)?;
         let of_sequences = if all.len() == runs.len() {
@@ -83,7 +88,10 @@ impl<'a> Similarity<'a> {
                 |some: &_, others: &_| model.scores_between(some, others) / single(score_sd);
             sequence_odds::of_thinned(&neighbours, &components, score, &learned)
         };
+        let known = (channel, learned.range_m);
         Some(Self {
+            share: runs.len() as f64 / all.len() as f64,
+            view_map: view_map(known, &runs, &centres, &model, &matched),
             learned: LearnedChannel {
                 channel,
                 views: u32::try_from(runs.len()).unwrap_or(u32::MAX),
@@ -105,6 +113,12 @@ impl<'a> Similarity<'a> {
     /// What was learned of the channel.
     pub fn learned(&self) -> &LearnedChannel {
         &self.learned
+    }
+
+    /// What is kept of the channel to compare views with that are seen later. It lies nowhere so
+    /// far.
+    pub fn view_map(&self) -> &ViewMap {
+        &self.view_map
     }
 
     /// The matches of each view with earlier ones, wherever they are.
@@ -205,12 +219,13 @@ impl<'a> Similarity<'a> {
 
     /// Whether two views are so far from one another along the way that they may be matched.
     fn is_apart(&self, a: usize, b: usize) -> bool {
-        let gap = tuning::GAP_MIN.max(self.runs.len() / tuning::GAP_PART);
+        let gap = gap(self.runs.len());
         !self.runs.is_same(a, b) || a.abs_diff(b) >= gap
     }
 
     /// Log of how much more probable the views are where a map has them than anywhere, with what
-    /// they should have been like where the map has others.
+    /// they should have been like where the map has others. Each that is matched stands for those
+    /// about it that are not.
     pub fn evidence(&self, positions: &[Option<Point3<f64>>]) -> f64 {
         let mut sum = 0.0;
         for (index, position) in positions.iter().enumerate() {
@@ -232,8 +247,49 @@ impl<'a> Similarity<'a> {
             }
             sum += (found / expected).ln();
         }
-        sum * self.learned.independence.sqrt()
+        sum / self.share * self.learned.independence.sqrt()
     }
+}
+
+/// Fewest views that lie between two of a run that may be matched, of so many in all.
+pub(crate) fn gap(n_views: usize) -> usize {
+    tuning::GAP_MIN.max(n_views / tuning::GAP_PART)
+}
+
+/// What later views are compared with; the views lie nowhere so far.
+fn view_map(
+    (channel, range_m): (u8, f64),
+    runs: &Runs<'_>,
+    centres: &Centres,
+    model: &TwoCovariance,
+    components: &DMatrix<f64>,
+) -> ViewMap {
+    let singles = |numbers: &mut dyn Iterator<Item = &f64>| -> Vec<f32> {
+        numbers.map(|&number| single(number)).collect()
+    };
+    let own = { centres.own.iter() }.map(|((agent, session), mean)| SessionCentre {
+        agent: *agent,
+        session: *session,
+        mean: singles(&mut mean.iter()),
+    });
+    let views = runs.views.iter().zip(components.row_iter());
+    let references = views.map(|(view, components)| ReferenceView {
+        sample: view.sample,
+        ordinal: view.ordinal,
+        stretch: view.stretch,
+        position: None,
+        components: singles(&mut components.iter()),
+    });
+    let model = ViewModel {
+        channel,
+        range_m,
+        stride: runs.stride,
+        centre: singles(&mut centres.whole.iter()),
+        centres: own.collect(),
+        projection: singles(&mut model.columns.iter()),
+        correlations: model.correlations.clone(),
+    };
+    ViewMap::new(model, references.collect())
 }
 
 #[cfg(test)]

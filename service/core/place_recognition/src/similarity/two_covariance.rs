@@ -19,9 +19,9 @@ use crate::tuning::similarity as tuning;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TwoCovariance {
     /// V / √w: a row for each number of a view, a column for each component.
-    columns: DMatrix<f64>,
+    pub(super) columns: DMatrix<f64>,
     /// r of each component.
-    correlations: Vec<f64>,
+    pub(super) correlations: Vec<f64>,
 }
 
 impl TwoCovariance {
@@ -136,6 +136,6 @@ impl TwoCovariance {
     clippy::cast_possible_truncation,
     reason = "a score is no exact number"
 )]
-pub(super) fn single(value: f64) -> f32 {
+pub(crate) fn single(value: f64) -> f32 {
     value as f32
 }

@@ -163,6 +163,7 @@ impl Team {
             turn_noises: vec![(0, 0.5)],
             matches: None,
             learned: None,
+            view_maps: None,
             poses: chains.keyframes.iter().filter_map(pose).collect(),
             states: { closures.iter() }
                 .filter(|(_, closure)| closure.is_candidate())
