@@ -359,50 +359,7 @@ pub(crate) mod similarity {
     pub(crate) const DEPTH: (f64, f64) = (0.05, 6.0);
 }
 
-/// Tracking among the views of a map. Lengths are in ranges of the channel.
-pub(crate) mod tracking {
-    /// Particles of an agent, and most agents: the one whose latest view is the oldest is dropped.
-    pub(crate) const COUNT: usize = 1000;
-    pub(crate) const AGENTS_MAX: usize = 256;
-    /// Width of the kernel by which views are of one place.
-    pub(crate) const WIDTH: f64 = 0.5;
-    /// Farthest view that counts, in widths.
-    pub(crate) const KERNEL_REACH: f64 = 3.0;
-    /// Side of the cells in which a view is as probable everywhere.
-    pub(crate) const CELL: f64 = 0.25;
-    /// Classes of how many views are about a position: up to 2⁸.
-    pub(crate) const CLASS_MAX: usize = 16;
-    /// ε: probability that a view shows something else.
-    pub(crate) const ELSE: f64 = 0.05;
-    /// Largest evidence of a view for a position \[nats\].
-    pub(crate) const NATS_MAX: f64 = 50.0;
-    /// Weight of views that nobody took.
-    pub(crate) const UNKNOWN: f64 = 0.5;
-    /// Part of its evidence that a view counts: neighbours err alike, and so does the map.
-    pub(crate) const PART: f64 = 0.1;
-    /// Least and largest noise of a heading \[rad/√s\]: of a gyroscope, and of an animal.
-    pub(crate) const NOISE_RAD: (f64, f64) = (0.005, 0.5);
-    /// Standard deviation by which its logarithm changes with a view.
-    pub(crate) const NOISE_STEP: f64 = 0.05;
-    /// Standard deviation of the factor of lengths, and of a position, as a part of the way.
-    pub(crate) const SCALE_SD: f64 = 0.1;
-    pub(crate) const POSITION_PART: f64 = 0.15;
-    /// An estimate that is so far from where motion leads was put elsewhere: ranges, and part of
-    /// the way; and \[rad\].
-    pub(crate) const PUT_RANGES: f64 = 0.1;
-    pub(crate) const PUT_PART: f64 = 0.2;
-    pub(crate) const PUT_RAD: f64 = 0.3;
-    /// Particles that stay when an estimate was put elsewhere.
-    pub(crate) const KEPT: usize = 750;
-    /// Rate at which the mean fit of views follows, and the one \[nats\] below which an agent is
-    /// where nothing was seen: between ln ε there, and zero of one that may be anywhere in the map.
-    pub(crate) const FIT_RATE: f64 = 0.1;
-    pub(crate) const FIT_ELSEWHERE: f64 = -1.0;
-    /// Standard deviation below which a position is known.
-    pub(crate) const NEAR: f64 = 4.0;
-    /// Standard deviation below which nobody gets by views: that of the map.
-    pub(crate) const FLOOR: f64 = 0.25;
-}
+pub(crate) mod tracking;
 
 /// Cells of mean views. Lengths are those of channels that reach farther than a room, such as
 /// Wi-Fi (docs/decisions/0072).

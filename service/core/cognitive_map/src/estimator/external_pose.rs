@@ -55,9 +55,8 @@ impl Estimator {
         })
     }
 
-    /// An agent of the map is where another estimate has it, which rests upon all that the present
-    /// one does; its error on the right has this covariance. It is no longer correlated with
-    /// anything.
+    /// An agent of the map is where another estimate has it, in place of the present one; its error
+    /// on the right has this covariance. It is no longer correlated with anything.
     pub fn settle(
         &mut self,
         agent: u32,

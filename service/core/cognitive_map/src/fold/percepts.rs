@@ -72,8 +72,11 @@ impl Fold<'_> {
     }
 
     /// Corrects the pose of an agent that knows about where it is, by what it sees in a map that
-    /// views hold together.
+    /// views hold together. One that is followed since it was found is corrected by that.
     fn track(&mut self, view: &View<'_>) {
+        if self.keyframes.is_waking(self.agent_id.0) {
+            return;
+        }
         let Some(tracked) = self.keyframes.track(view, self.stamp_ns) else {
             return;
         };

@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 use super::graph::KeyframeGraph;
 use super::map::KeyframeMap;
 use super::settings::KeyframeSettings;
-use place_recognition::{LearnedChannel, Part, ViewLog, ViewMatch};
+use place_recognition::{LearnedChannel, Part, ViewLog, ViewMap, ViewMatch};
 use state::Digest;
 use state::{CorruptState, State, StateReader, StateWriter};
 use state::{NONE, PagedVec, read_list, write_list, write_page};
@@ -212,7 +212,8 @@ impl KeyframeMap {
             Stored::InGraph(vector, _) => vector(&self.graph).bytes(),
             Stored::InRecognition(_) => 0,
         });
-        in_graph.sum::<usize>() + self.recognition.bytes()
+        let views: usize = self.view_maps().map(ViewMap::bytes).sum();
+        in_graph.sum::<usize>() + self.recognition.bytes() + views
     }
 
     fn head(&self) -> KeyframePage {

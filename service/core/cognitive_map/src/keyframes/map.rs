@@ -69,6 +69,7 @@ impl KeyframeMap {
     fn forget_searches(&mut self, agent: u32) {
         self.recognition.end_search(agent);
         self.recognition.end_waking(agent);
+        self.recognition.end_tracking(agent);
         let latest = self.graph.chains.track(agent).map_or(0, |track| track.seq);
         self.recognition.confirm_pose(agent, latest);
     }
@@ -108,14 +109,17 @@ impl KeyframeMap {
     /// `accepted` is the number of its sightings so far that agree with that.
     pub fn is_contradicted(&mut self, view: &View<'_>, accepted: u64) -> bool {
         let chains = &self.graph.chains;
+        // A view that fits where the agent is tracked speaks for it as a sighting does.
+        let fitting = self.recognition.fitting_views(view.sample.agent);
+        let accepted = accepted.wrapping_add(fitting);
         self.recognition.is_contradicted(view, accepted, chains)
-            && !self.recognition.is_tracked(view.sample)
     }
 
     /// An agent may be anywhere. What it saw since that is contradicted is forgotten where it was
     /// estimated to be, and a search begins with it.
     pub fn declare_kidnapped(&mut self, moment: &Moment) {
         self.recognition.declare_kidnapped(self.sample(moment));
+        self.recognition.end_tracking(moment.agent);
         self.recognition.end_waking(moment.agent);
         self.graph.begin_stretch(moment.agent, None);
     }

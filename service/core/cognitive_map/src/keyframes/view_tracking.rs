@@ -29,6 +29,9 @@ impl KeyframeMap {
 impl KeyframeGraph {
     /// What later views are compared with, where the keyframes have it.
     pub(super) fn located_view_maps(&self) -> Vec<ViewMap> {
+        if self.is_tied_by_sightings() {
+            return Vec::new(); // nobody is tracked among them
+        }
         let position = |sample: SampleKey| {
             let pose = self.chains.pose_of(&self.chains.at_sample(sample)?)?;
             Some(Point3::from(pose.translation.vector))

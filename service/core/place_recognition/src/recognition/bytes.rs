@@ -125,12 +125,11 @@ impl PlaceRecognition {
         let is_channel = |channel, length| self.views.is_channel(channel, length);
         let mut searches = self.searches.iter();
         let mut tests = self.kidnap_tests.iter();
-        let channels = self.views.channels.len();
         let mut trackers = self.trackers.iter();
         self.views.is_sound(agents)
             && self.waking.is_sound(agents)
             && self.trackers.len() <= AGENTS_MAX
-            && trackers.all(|tracker| tracker.is_sound(agents, channels))
+            && trackers.all(|tracker| tracker.is_sound(agents))
             && searches.all(|search| search.is_sound(agents, is_channel))
             && tests.all(|test| test.is_sound(agents, is_channel))
     }

@@ -9,12 +9,11 @@ pub use bytes::Part;
 pub use relocalise::{Guess, Relocalised};
 pub use revisit::Revisit;
 
-use crate::keyframes::SampleKey;
 use crate::relocalisation::{KidnapTests, Searches};
 use crate::sequences::ViewMemory;
 use crate::similarity::ViewLog;
 use crate::tracking::{Tracked, Tracker, ViewMap};
-use crate::tuning::tracking::AGENTS_MAX;
+use crate::tuning::tracking::{AGENTS_MAX, IDLE_RECORDS};
 use crate::view::View;
 use crate::waking::{Found, Waking};
 use state::PagedVec;
@@ -61,6 +60,7 @@ impl PlaceRecognition {
     /// An agent was put somewhere else: what it sees from now on is not beside what it saw.
     pub fn cut(&mut self, agent: u32) {
         self.views.cut(agent, self.revision);
+        self.end_tracking(agent);
     }
 
     /// All that agents of the map saw.
@@ -97,18 +97,15 @@ impl PlaceRecognition {
         stamp_ns: i64,
         mut maps: impl Iterator<Item = &'a ViewMap>,
     ) -> Option<Tracked> {
-        let log = &self.views.log.views;
-        let last = log.get(log.len().checked_sub(1)?)?;
-        let logged = Some(last)
-            .filter(|last| last.sample == view.sample)?
-            .clone();
+        let logged = self.views.taken.take();
+        let logged = logged.filter(|logged| logged.sample == view.sample)?;
         let map = maps.find(|map| map.channel() == logged.channel)?;
         let revision = self.revision;
-        let number = self.tracker_of(view.sample.agent);
-        let is_same = { self.trackers.get(number) }
-            .is_some_and(|tracker| tracker.is_of(view.sample, logged.channel));
+        let number = self.tracker_of(view.sample.agent)?;
+        let is_same =
+            { self.trackers.get(number) }.is_some_and(|tracker| tracker.is_of(view.sample));
         if !is_same {
-            let tracker = Tracker::new(view, stamp_ns, logged.channel);
+            let tracker = Tracker::new(view, stamp_ns);
             match self.trackers.get_mut(number, revision) {
                 Some(slot) => *slot = tracker,
                 None => self.trackers.push(tracker, revision),
@@ -119,23 +116,29 @@ impl PlaceRecognition {
         tracker.step(view, stamp_ns, &logged, map)
     }
 
-    /// The number of an agent's tracker, or of the one in whose place it comes.
-    fn tracker_of(&self, agent: u32) -> usize {
+    /// The number of an agent's tracker, or of one in whose place it comes; `None` where all are
+    /// in use.
+    fn tracker_of(&self, agent: u32) -> Option<usize> {
         let own = { self.trackers.iter() }.position(|one| one.agent == agent);
-        own.unwrap_or_else(|| {
-            if self.trackers.len() < AGENTS_MAX {
-                return self.trackers.len();
-            }
-            let used = self.trackers.iter().map(|one| one.used).enumerate();
-            used.min_by_key(|(_, used)| *used)
-                .map_or(0, |(number, _)| number)
+        let new = (self.trackers.len() < AGENTS_MAX).then_some(self.trackers.len());
+        own.or(new).or_else(|| {
+            let is_idle = |one: &Tracker| self.revision.saturating_sub(one.used) > IDLE_RECORDS;
+            self.trackers.iter().position(is_idle)
         })
     }
 
-    /// Whether what an agent has seen lately fits a map where it is tracked.
-    pub fn is_tracked(&self, sample: SampleKey) -> bool {
-        let mut trackers = self.trackers.iter();
-        trackers.any(|tracker| tracker.fits(sample))
+    /// Ends the tracking of an agent: it begins anew about its estimate.
+    pub fn end_tracking(&mut self, agent: u32) {
+        let own = { self.trackers.iter() }.position(|one| one.agent == agent);
+        if let Some(tracker) = own.and_then(|own| self.trackers.get_mut(own, self.revision)) {
+            tracker.restart();
+        }
+    }
+
+    /// Views so far of an agent that is tracked which fit where it was.
+    pub fn fitting_views(&self, agent: u32) -> u64 {
+        let own = { self.trackers.iter() }.find(|one| one.agent == agent);
+        own.map_or(0, |tracker| tracker.fitting)
     }
 
     /// Whether what later views are compared with is of a channel that is there.

@@ -24,11 +24,15 @@ pub(crate) struct ViewMemory {
     pub(crate) log: ViewLog,
     /// Times that views were renumbered.
     pub(crate) thinnings: u64,
+    /// The view that was added last, whether the log keeps it or not, until it is taken: no part
+    /// of the state, since it is taken with the record that brings it.
+    pub(crate) taken: Option<LoggedView>,
 }
 
 impl ViewMemory {
     /// Remembers a view; answers the sequence matches that end with it.
     pub(crate) fn add(&mut self, view: &View<'_>, revision: u64) -> Vec<SequenceMatch> {
+        self.taken = None;
         let vector = view.vector;
         let Some(channel) = self.channel_of(view) else {
             return Vec::new();
@@ -54,6 +58,7 @@ impl ViewMemory {
             in_odom: view.in_odom,
             vector: logged(vector),
         };
+        self.taken = Some(seen.clone());
         self.log.add(seen, revision);
         let model = &mut self.channels[usize::from(channel)];
         let (mut is_news, mut is_outlier) = (true, None);

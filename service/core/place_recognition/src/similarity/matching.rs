@@ -6,7 +6,7 @@ use super::centres::Centres;
 use super::learned_channel::LearnedChannel;
 use super::log_odds::{Learned, information_nats};
 use super::neighbours::Neighbours;
-use super::runs::Runs;
+use super::runs::{Runs, gap};
 use super::sequence_odds;
 use super::two_covariance::{TwoCovariance, single};
 use super::view_log::ViewLog;
@@ -249,11 +249,6 @@ impl<'a> Similarity<'a> {
         }
         sum / self.share * self.learned.independence.sqrt()
     }
-}
-
-/// Fewest views that lie between two of a run that may be matched, of so many in all.
-pub(crate) fn gap(n_views: usize) -> usize {
-    tuning::GAP_MIN.max(n_views / tuning::GAP_PART)
 }
 
 /// What later views are compared with; the views lie nowhere so far.

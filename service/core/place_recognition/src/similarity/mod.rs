@@ -12,8 +12,8 @@ mod two_covariance;
 mod view_log;
 
 pub use learned_channel::LearnedChannel;
-pub(crate) use matching::gap;
 pub use matching::{Similarity, ViewMatch};
+pub(crate) use runs::gap;
 pub(crate) use two_covariance::single;
 pub use view_log::ViewLog;
 pub(crate) use view_log::{LoggedView, logged};

@@ -1,6 +1,7 @@
 //! Views in the order in which agents saw them.
 
 use super::view_log::{LoggedView, ViewLog};
+use crate::tuning::similarity as tuning;
 
 /// The views of a channel, by agent, session and time.
 #[derive(Debug)]
@@ -111,4 +112,9 @@ impl<'a> Runs<'a> {
         let [a, b] = [a, b].map(|index| self.views[index].in_odom.translation.vector);
         (a - b).norm()
     }
+}
+
+/// Fewest views that lie between two of a run that may be matched, of so many in all.
+pub(crate) fn gap(n_views: usize) -> usize {
+    tuning::GAP_MIN.max(n_views / tuning::GAP_PART)
 }

@@ -42,12 +42,20 @@ impl Floor {
             let seen = (PLACE.sqrt() * place + (1.0 - PLACE).sqrt() * draws.normal()) as f32;
             seen
         };
+        if self.0.is_empty() {
+            return vec![0.0; NUMBERS];
+        }
         self.0.chunks(4).map(number).collect()
     }
 }
 
 /// The room, as a map has it: a view every quarter of a range.
 fn map(floor: &Floor, draws: &mut Seeded) -> ViewMap {
+    map_at(floor, &Vector3::zeros(), draws)
+}
+
+/// The same, with a corner of the room at a point.
+fn map_at(floor: &Floor, origin: &Vector3<f64>, draws: &mut Seeded) -> ViewMap {
     let per_side = 32;
     let model = ViewModel {
         channel: 0,
@@ -72,7 +80,7 @@ fn map(floor: &Floor, draws: &mut Seeded) -> ViewMap {
             },
             ordinal: number,
             stretch: 0,
-            position: Some(at),
+            position: Some(at + origin),
             components: floor.seen(&at, draws),
         }
     };
@@ -97,7 +105,7 @@ impl Walk {
             truth: at,
             estimate: at,
             in_odom: Isometry3::identity(),
-            sd: [0.05, 0.05, 0.0, 0.0, 0.0, 0.1],
+            sd: [0.2, 0.2, 0.0, 0.0, 0.0, 0.2],
             seq: 0,
             tracker: None,
         }
@@ -106,10 +114,15 @@ impl Walk {
     /// Goes on by a step, turning back at the walls of the room, with so much noise of the turn
     /// [rad].
     fn go(&mut self, noise_rad: f64, draws: &mut Seeded) {
+        self.go_in(&Vector3::zeros(), noise_rad, draws);
+    }
+
+    /// The same in a room of which a corner is at a point.
+    fn go_in(&mut self, origin: &Vector3<f64>, noise_rad: f64, draws: &mut Seeded) {
         let mut turn = 0.3 * draws.normal();
-        let ahead = (self.truth * pose(STEP_M, 0.0, turn)).translation.vector;
+        let ahead = (self.truth * pose(STEP_M, 0.0, turn)).translation.vector - origin;
         if !(0.2..SIDE_M - 0.2).contains(&ahead.x) || !(0.2..SIDE_M - 0.2).contains(&ahead.y) {
-            let inwards = Vector3::new(2.0, 2.0, 0.0) - self.truth.translation.vector;
+            let inwards = Vector3::new(2.0, 2.0, 0.0) + origin - self.truth.translation.vector;
             let heading = self.truth.rotation.euler_angles().2;
             turn = (inwards.y.atan2(inwards.x) - heading + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
         }
@@ -121,7 +134,19 @@ impl Walk {
 
     /// Sees what there is, and is put where the tracker has it.
     fn see(&mut self, floor: &Floor, map: &ViewMap, draws: &mut Seeded) -> Option<Tracked> {
-        let vector = floor.seen(&self.truth.translation.vector.into(), draws);
+        self.see_in(floor, &Vector3::zeros(), map, draws)
+    }
+
+    /// The same in a room of which a corner is at a point.
+    fn see_in(
+        &mut self,
+        floor: &Floor,
+        origin: &Vector3<f64>,
+        map: &ViewMap,
+        draws: &mut Seeded,
+    ) -> Option<Tracked> {
+        let at = self.truth.translation.vector - origin;
+        let vector = floor.seen(&at.into(), draws);
         let sample = SampleKey {
             agent: 0,
             session: 0,
@@ -145,7 +170,7 @@ impl Walk {
             vector: vector.clone().into(),
         };
         let stamp_ns = i64::try_from(self.seq).unwrap() * 500_000_000;
-        let new = || Tracker::new(&view, stamp_ns, 0);
+        let new = || Tracker::new(&view, stamp_ns);
         let tracker = self.tracker.get_or_insert_with(new);
         let tracked = tracker.step(&view, stamp_ns, &logged, map);
         if let Some(tracked) = &tracked {
@@ -272,8 +297,8 @@ fn what_was_written_goes_on_as_before() {
     let mut input = StateReader::new(&bytes);
     let tracker = Tracker::read(&mut input).unwrap();
     let read = ViewMap::read(&mut input).unwrap();
-    assert!(read == map && read.is_sound(Some(NUMBERS)) && tracker.is_sound(1, 1));
-    assert!(!read.is_sound(Some(NUMBERS + 1)) && !tracker.is_sound(0, 1));
+    assert!(read == map && read.is_sound(Some(NUMBERS)) && tracker.is_sound(1));
+    assert!(!read.is_sound(Some(NUMBERS + 1)) && !tracker.is_sound(0));
     let next = |walk: &mut Walk, map: &ViewMap| walk.see(&floor, map, &mut Seeded(10));
     let mut restored = Walk {
         tracker: Some(tracker),
@@ -282,4 +307,53 @@ fn what_was_written_goes_on_as_before() {
     let by_restored = next(&mut restored, &read);
     assert!(by_restored.is_some());
     assert_eq!(by_restored, next(&mut walk, &map));
+}
+
+#[test]
+fn a_covered_sensor_and_a_surer_estimate_change_nothing() {
+    let mut draws = Seeded(11);
+    let floor = Floor::new(&mut draws);
+    let map = map(&floor, &mut draws);
+    let mut walk = Walk::new();
+    for _ in 0..30 {
+        walk.go(0.05, &mut draws);
+        walk.see(&floor, &map, &mut draws);
+    }
+    let fitting = walk.tracker.as_ref().unwrap().fitting;
+    assert!(fitting > 10, "{fitting}");
+    // It shows the mean of all views from now on.
+    let covered = Floor(Vec::new());
+    for _ in 0..30 {
+        walk.go(0.05, &mut draws);
+        assert_eq!(walk.see(&covered, &map, &mut draws), None);
+    }
+    assert_eq!(walk.tracker.as_ref().unwrap().fitting, fitting);
+    // It is told where it is to a centimetre, again and again.
+    walk.sd = [0.01, 0.01, 0.0, 0.0, 0.0, 0.01];
+    for _ in 0..30 {
+        walk.go(0.05, &mut draws);
+        walk.estimate = walk.truth;
+        assert_eq!(walk.see(&floor, &map, &mut draws), None);
+    }
+}
+
+#[test]
+fn a_map_far_from_its_origin_is_as_one_about_it() {
+    let far = Vector3::new(5e6, -3e6, 0.0);
+    let off_m = [Vector3::zeros(), far].map(|origin| {
+        let mut draws = Seeded(12);
+        let floor = Floor::new(&mut draws);
+        let map = map_at(&floor, &origin, &mut draws);
+        let mut walk = Walk::new();
+        walk.truth.translation.vector += origin;
+        walk.estimate = walk.truth;
+        let mut sum = 0.0;
+        for _ in 0..100 {
+            walk.go_in(&origin, 0.05, &mut draws);
+            walk.see_in(&floor, &origin, &map, &mut draws);
+            sum += walk.off_m();
+        }
+        sum / 100.0
+    });
+    assert!((off_m[0] - off_m[1]).abs() < 0.01, "{off_m:?}");
 }

@@ -25,8 +25,8 @@ pub struct Tracked {
 /// Where the agent may be.
 #[derive(Clone, Copy, Debug)]
 struct Particle {
-    /// Position in the map \[m\].
-    at: [f32; 3],
+    /// Position beside that of the estimate, in axes of the map \[m\].
+    off: [f32; 2],
     /// Turn of the body about the vertical, beyond that of the estimate \[rad\].
     turn_rad: f32,
     /// Logarithm of the noise of the turn \[rad/√s\].
@@ -35,7 +35,7 @@ struct Particle {
 }
 
 state_of_struct!(Particle {
-    at,
+    off,
     turn_rad,
     noise,
     weight
@@ -43,18 +43,17 @@ state_of_struct!(Particle {
 
 /// The particle filter of an agent that knows about where it is, by the views of a map.
 ///
-/// Between relaxations odometry drifts. Its heading errs by more than it says for seconds, or is
-/// known only to a turn or so: no Gaussian says that. So each particle has a heading of its own, and
-/// a noise of its own by which that changes; those that fit what is seen stay.
+/// Between relaxations odometry drifts. Its heading errs by more than it says for seconds, and no
+/// Gaussian says that. So each particle has a heading of its own, and a noise of its own by which
+/// that changes; those that fit what is seen stay.
 #[derive(Clone, Debug)]
 pub(crate) struct Tracker {
     pub(crate) agent: u32,
     /// The revision of the map with which it took in a view last.
     pub(crate) used: u64,
     session: u32,
-    channel: u8,
-    /// Views so far.
-    n_views: u32,
+    /// Views so far that fit where the agent was.
+    pub(crate) fitting: u64,
     stamp_ns: i64,
     /// Pose by motion alone at the latest view.
     in_odom: Isometry3<f64>,
@@ -70,8 +69,7 @@ state_of_struct!(Tracker {
     agent,
     used,
     session,
-    channel,
-    n_views,
+    fitting,
     stamp_ns,
     in_odom,
     pose,
@@ -81,37 +79,33 @@ state_of_struct!(Tracker {
 
 impl Tracker {
     /// Of an agent that is where a view has it.
-    pub(crate) fn new(view: &View<'_>, stamp_ns: i64, channel: u8) -> Self {
-        let mut tracker = Self {
+    pub(crate) fn new(view: &View<'_>, stamp_ns: i64) -> Self {
+        Self {
             agent: view.sample.agent,
             used: 0,
             session: view.sample.session,
-            channel,
-            n_views: 0,
+            fitting: 0,
             stamp_ns,
             in_odom: view.in_odom,
             pose: view.pose,
             fit: tuning::FIT_ELSEWHERE,
             particles: Vec::new(),
-        };
-        let mut draws = tracker.draws();
-        tracker.particles = drawn(view, tuning::COUNT, &mut draws);
-        tracker
+        }
     }
 
-    /// Whether it is of the session of a sample, and of a channel.
-    pub(crate) fn is_of(&self, sample: SampleKey, channel: u8) -> bool {
-        (self.agent, self.session, self.channel) == (sample.agent, sample.session, channel)
+    /// Forgets where the agent was: it begins anew about its estimate.
+    pub(crate) fn restart(&mut self) {
+        self.particles.clear();
     }
 
-    /// Whether what the agent has seen lately, in the session of a sample, fits where it is.
-    pub(crate) fn fits(&self, sample: SampleKey) -> bool {
-        (self.agent, self.session) == (sample.agent, sample.session) && self.fit > 0.0
+    /// Whether it is of the session of a sample.
+    pub(crate) fn is_of(&self, sample: SampleKey) -> bool {
+        (self.agent, self.session) == (sample.agent, sample.session)
     }
 
     /// Takes in a view, `logged` as the map has them, and answers where the agent is; `None` while
-    /// that is hardly known, or views are no more probable there than anywhere. While they are those
-    /// of no place of the map, the particles stay about the estimate.
+    /// that is hardly known, or views are no more probable there than anywhere. While they are of
+    /// no place of the map, the particles stay about the estimate.
     pub(crate) fn step(
         &mut self,
         view: &View<'_>,
@@ -119,33 +113,38 @@ impl Tracker {
         logged: &LoggedView,
         map: &ViewMap,
     ) -> Option<Tracked> {
+        let components = map.components(logged)?;
         let range_m = map.model.range_m;
-        self.n_views = self.n_views.saturating_add(1);
-        let mut draws = self.draws();
-        self.go(view, stamp_ns, range_m, &mut draws);
-        let gain = self.weigh(logged, map);
+        let mut draws = draws(view.sample);
+        if self.particles.is_empty() {
+            self.fit = tuning::FIT_ELSEWHERE;
+            self.particles = drawn(view, tuning::COUNT, &mut draws);
+        } else {
+            self.go(view, stamp_ns, range_m, &mut draws);
+        }
+        (self.stamp_ns, self.in_odom, self.pose) = (stamp_ns, view.in_odom, view.pose);
+        let gain = self.weigh(&components, logged, map);
+        let gain = gain.clamp(-tuning::GAIN_MAX, tuning::GAIN_MAX);
         self.fit += (gain - self.fit) * tuning::FIT_RATE;
-        (self.in_odom, self.pose) = (view.in_odom, view.pose);
-        if self.fit < tuning::FIT_ELSEWHERE {
+        if self.fit > 0.0 && gain > 0.0 {
+            self.fitting = self.fitting.wrapping_add(1);
+        }
+        let floor_m = tuning::FLOOR * range_m;
+        let is_surer = view.covariance.position_sd_m() < floor_m;
+        if self.fit < tuning::FIT_ELSEWHERE || is_surer {
             self.particles = drawn(view, tuning::COUNT, &mut draws);
             return None;
         }
-        let tracked = self.gaussian(view, tuning::FLOOR * range_m);
+        let Some(tracked) = self.gaussian(view, floor_m) else {
+            self.restart();
+            return None;
+        };
         self.resample(&mut draws);
         let is_near = tracked.covariance.position_sd_m() < tuning::NEAR * range_m;
         (is_near && self.fit > 0.0).then(|| {
             self.leave_at(&tracked.pose);
             tracked
         })
-    }
-
-    /// Its random numbers: the same on every run.
-    fn draws(&self) -> Seeded {
-        let seed = u64::from(self.agent) << 32 | u64::from(self.n_views);
-        Seeded(random::bits(
-            seed,
-            [self.session.into(), self.channel.into(), 2],
-        ))
     }
 
     /// Moves the particles as the estimate has moved. Where that has been put elsewhere meanwhile,
@@ -160,8 +159,8 @@ impl Tracker {
         let there = if is_put { by_odometry } else { view.pose };
         let way = there.translation.vector - self.pose.translation.vector;
         #[expect(clippy::cast_precision_loss, reason = "seconds between two views")]
-        let seconds = (stamp_ns.saturating_sub(self.stamp_ns).max(0) as f64 * 1e-9).sqrt();
-        self.stamp_ns = stamp_ns;
+        let seconds = stamp_ns.saturating_sub(self.stamp_ns) as f64 * 1e-9;
+        let root_s = seconds.clamp(0.0, tuning::SECONDS_MAX).sqrt();
         let position_sd = tuning::POSITION_PART * length_m;
         for particle in &mut self.particles {
             let [a, b] = pair(draws);
@@ -170,18 +169,18 @@ impl Tracker {
             let noise = f64::from(particle.noise) + tuning::NOISE_STEP * e;
             let noise = noise.clamp(tuning::NOISE_RAD.0.ln(), tuning::NOISE_RAD.1.ln());
             let turned = f64::from(particle.turn_rad);
-            let stepped = noise.exp() * seconds * c;
+            let stepped = noise.exp() * root_s * c;
             let (sin, cos) = (turned + 0.5 * stepped).sin_cos();
             let scale = 1.0 + tuning::SCALE_SD * d;
-            let [x, y, z] = particle.at.map(f64::from);
-            particle.at = floats([
-                x + scale * (cos * way.x - sin * way.y) + position_sd * a,
-                y + scale * (sin * way.x + cos * way.y) + position_sd * b,
-                z + scale * way.z,
+            let [x, y] = particle.off.map(f64::from);
+            particle.off = floats([
+                x + scale * (cos * way.x - sin * way.y) - way.x + position_sd * a,
+                y + scale * (sin * way.x + cos * way.y) - way.y + position_sd * b,
             ]);
-            [particle.turn_rad, particle.noise] = floats([turned + stepped, noise]);
+            [particle.turn_rad, particle.noise] = floats([wrapped(turned + stepped), noise]);
         }
         if is_put {
+            self.shift(&(there.translation.vector - view.pose.translation.vector));
             self.re_base(&there.rotation, &view.pose.rotation);
             self.resample_to(tuning::KEPT, draws);
             let new = drawn(view, tuning::COUNT - self.particles.len(), draws);
@@ -193,12 +192,21 @@ impl Tracker {
     fn re_base(&mut self, from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>) {
         let (_, _, turned) = (from * to.inverse()).euler_angles();
         for particle in &mut self.particles {
-            [particle.turn_rad] = floats([f64::from(particle.turn_rad) + turned]);
+            [particle.turn_rad] = floats([wrapped(f64::from(particle.turn_rad) + turned)]);
+        }
+    }
+
+    /// Counts positions from another one of the estimate on, from which the old one is off by that.
+    fn shift(&mut self, off: &Vector3<f64>) {
+        for particle in &mut self.particles {
+            let [x, y] = particle.off.map(f64::from);
+            particle.off = floats([x + off.x, y + off.y]);
         }
     }
 
     /// The estimate is put where the filter has it.
     fn leave_at(&mut self, pose: &Isometry3<f64>) {
+        self.shift(&(self.pose.translation.vector - pose.translation.vector));
         let was = self.pose.rotation;
         self.re_base(&was, &pose.rotation);
         self.pose = *pose;
@@ -206,24 +214,22 @@ impl Tracker {
 
     /// Weighs the particles by what is seen; answers how much more probable that is where they are
     /// than anywhere \[nats\].
-    fn weigh(&mut self, logged: &LoggedView, map: &ViewMap) -> f64 {
+    fn weigh(&mut self, components: &[f32], logged: &LoggedView, map: &ViewMap) -> f64 {
         let width_m = tuning::WIDTH * map.model.range_m;
-        let reach_m = tuning::KERNEL_REACH * width_m;
-        let Some([low, high]) = self.bounds() else {
-            return 0.0;
-        };
-        let reach = Vector3::repeat(reach_m);
-        let mut similar = map.similar(logged, &[low - reach, high + reach]);
+        let reach = Vector3::repeat(tuning::KERNEL_REACH * width_m);
+        let [low, high] = self.bounds();
+        let mut similar = map.similar(components, logged, &[low - reach, high + reach]);
         similar.sort_by(|a, b| a.position.x.total_cmp(&b.position.x));
         let side_m = tuning::CELL * map.model.range_m;
-        let mut keys: Vec<([i32; 3], u32)> = (0..)
+        let mut keys: Vec<([i32; 2], u32)> = (0..)
             .zip(&self.particles)
             .map(|(number, particle)| (key(particle, side_m), number))
             .collect();
         keys.sort_unstable();
         let (mut gained, mut whole) = (0.0, 0.0);
         for cell in keys.chunk_by(|a, b| a.0 == b.0) {
-            let at = Point3::from(cell[0].0.map(|number| (f64::from(number) + 0.5) * side_m));
+            let [x, y] = cell[0].0.map(|number| (f64::from(number) + 0.5) * side_m);
+            let at = Point3::from(self.pose.translation.vector + Vector3::new(x, y, 0.0));
             let log_likelihood = log_likelihood(&at, &similar, width_m);
             let factor = (tuning::PART * log_likelihood).exp();
             for (_, number) in cell {
@@ -249,15 +255,14 @@ impl Tracker {
         }
     }
 
-    fn bounds(&self) -> Option<[Point3<f64>; 2]> {
-        let mut positions = self.particles.iter().map(Particle::position);
-        let first = positions.next()?;
-        Some(positions.fold([first, first], |[low, high], at| {
-            [low.inf(&at), high.sup(&at)]
-        }))
+    /// The corners of the box of all positions.
+    fn bounds(&self) -> [Point3<f64>; 2] {
+        let at = Point3::from(self.pose.translation.vector);
+        let positions = self.particles.iter().map(|particle| at + particle.off());
+        positions.fold([at, at], |[low, high], at| [low.inf(&at), high.sup(&at)])
     }
 
-    /// Resamples where the weights say little more than a few particles would.
+    /// Resamples where the weights are worth less than half of the particles.
     fn resample(&mut self, draws: &mut Seeded) {
         let squares: f64 = { self.particles.iter() }
             .map(|particle| f64::from(particle.weight).powi(2))
@@ -291,13 +296,18 @@ impl Tracker {
         self.particles = kept;
     }
 
-    /// The particles as a Gaussian about a pose. What they say nothing of, height and tilt, is as
-    /// the estimate has it.
-    fn gaussian(&self, view: &View<'_>, floor_m: f64) -> Tracked {
+    /// The particles as a Gaussian about a pose; `None` if they are nowhere. What they say nothing
+    /// of, height and tilt, is as the estimate has it.
+    fn gaussian(&self, view: &View<'_>, floor_m: f64) -> Option<Tracked> {
+        let weights = self.particles.iter().map(|each| f64::from(each.weight));
+        let whole: f64 = weights.sum();
+        if whole <= 0.0 {
+            return None;
+        }
         let (mut middle, mut sin, mut cos) = (Vector3::zeros(), 0.0, 0.0);
         for particle in &self.particles {
-            let weight = f64::from(particle.weight);
-            middle += particle.position().coords * weight;
+            let weight = f64::from(particle.weight) / whole;
+            middle += particle.off() * weight;
             let (s, c) = f64::from(particle.turn_rad).sin_cos();
             (sin, cos) = (sin + s * weight, cos + c * weight);
         }
@@ -311,32 +321,33 @@ impl Tracker {
             }
         }
         for particle in &self.particles {
-            let off = particle.position().coords - middle;
-            let turned = f64::from(particle.turn_rad) - turn_rad + TAU / 2.0;
-            let turned = turned.rem_euclid(TAU) - TAU / 2.0;
+            let off = particle.off() - middle;
+            let turned = wrapped(f64::from(particle.turn_rad) - turn_rad);
             let error = Vector6::new(off.x, off.y, 0.0, 0.0, 0.0, turned);
-            covariance += error * error.transpose() * f64::from(particle.weight);
+            covariance += error * error.transpose() * (f64::from(particle.weight) / whole);
         }
         for axis in 0..2 {
             covariance[(axis, axis)] += floor_m * floor_m;
         }
-        middle.z = view.pose.translation.z;
-        Tracked {
-            pose: Isometry3::from_parts(middle.into(), rotation),
+        let is_known = covariance
+            .iter()
+            .chain(&middle)
+            .all(|entry| entry.is_finite());
+        is_known.then(|| Tracked {
+            pose: Isometry3::from_parts((self.pose.translation.vector + middle).into(), rotation),
             covariance: in_body_axes(&covariance, &rotation),
-        }
+        })
     }
 
     /// Whether the state is one that this program may have written to a checkpoint.
-    pub(crate) fn is_sound(&self, agents: usize, channels: usize) -> bool {
+    pub(crate) fn is_sound(&self, agents: usize) -> bool {
         let is_finite = |particle: &Particle| {
-            let [x, y, z] = particle.at;
-            let all = [x, y, z, particle.turn_rad, particle.noise, particle.weight];
-            all.iter().all(|number| number.is_finite())
+            let [x, y] = particle.off;
+            let all = [x, y, particle.turn_rad, particle.noise, particle.weight];
+            all.iter().all(|number| number.is_finite()) && particle.weight >= 0.0
         };
         let is_pose = |pose: &Isometry3<f64>| pose.to_homogeneous().iter().all(|x| x.is_finite());
         (self.agent as usize) < agents
-            && usize::from(self.channel) < channels
             && self.fit.is_finite()
             && is_pose(&self.in_odom)
             && is_pose(&self.pose)
@@ -354,27 +365,40 @@ impl Tracker {
 const KEPT: [usize; 3] = [2, 3, 4];
 
 impl Particle {
-    fn position(&self) -> Point3<f64> {
-        Point3::from(self.at.map(f64::from))
+    fn off(&self) -> Vector3<f64> {
+        let [x, y] = self.off.map(f64::from);
+        Vector3::new(x, y, 0.0)
     }
+}
+
+/// Its random numbers with a sample: the same on every run.
+fn draws(sample: SampleKey) -> Seeded {
+    let seed = u64::from(sample.agent) << 32 | u64::from(sample.session);
+    Seeded(random::bits(seed, [sample.seq, 0, 2]))
+}
+
+/// An angle from -π to π.
+fn wrapped(angle_rad: f64) -> f64 {
+    (angle_rad + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0
 }
 
 /// Particles about the estimate.
 fn drawn(view: &View<'_>, count: usize, draws: &mut Seeded) -> Vec<Particle> {
     let in_map = view.covariance.in_map_axes(&view.pose.rotation);
-    let sd = |component: usize| in_map[(component, component)].max(0.0).sqrt();
+    let sd = |component: usize| {
+        let variance = in_map[(component, component)];
+        variance.max(0.0).sqrt().min(tuning::SD_MAX)
+    };
     let (sd_x, sd_y, sd_turn) = (sd(0), sd(1), sd(5));
-    let at = view.pose.translation.vector;
     let (low, high) = (tuning::NOISE_RAD.0.ln(), tuning::NOISE_RAD.1.ln());
     let [weight] = floats([1.0 / tuning::COUNT as f64]);
     let drawn = (0..count).map(|_| {
         let [a, b] = pair(draws);
         let [c, _] = pair(draws);
         let noise = low + (high - low) * draws.uniform();
-        let [x, y, z, turn_rad, noise] =
-            floats([at.x + sd_x * a, at.y + sd_y * b, at.z, sd_turn * c, noise]);
+        let [x, y, turn_rad, noise] = floats([sd_x * a, sd_y * b, sd_turn * c, noise]);
         Particle {
-            at: [x, y, z],
+            off: [x, y],
             turn_rad,
             noise,
             weight,
@@ -413,8 +437,8 @@ fn log_likelihood(at: &Point3<f64>, similar: &[Similar], width_m: f64) -> f64 {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-fn key(particle: &Particle, side_m: f64) -> [i32; 3] {
-    particle.at.map(|x| (f64::from(x) / side_m).floor() as i32)
+fn key(particle: &Particle, side_m: f64) -> [i32; 2] {
+    particle.off.map(|x| (f64::from(x) / side_m).floor() as i32)
 }
 
 /// A covariance of an error in axes of the map, on the right of a pose.

@@ -10,6 +10,9 @@ use crate::tuning::{log, tracking as tuning};
 use geometry::is_somewhere;
 use state::{CorruptState, Counted, State, StateReader, StateWriter, state_of_struct};
 
+/// Least length of a view beside its mean, of its own length: about rounding errors.
+const LEAST: f32 = 1e-5;
+
 /// What was learned of a channel when its views were last matched, with these views where the map
 /// that was relaxed then has them: what another view says of where it was seen.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,21 +129,34 @@ impl ViewMap {
         self.fill_field();
     }
 
+    /// The components of a view; `None` of one that shows nothing but what all show.
+    pub(crate) fn components(&self, view: &LoggedView) -> Option<Vec<f32>> {
+        self.model.components(view)
+    }
+
+    /// Bytes of memory that its views take.
+    pub fn bytes(&self) -> usize {
+        let numbers = self.model.centre.len() + self.model.projection.len();
+        let components = 2 * self.model.correlations.len();
+        let each = size_of::<ReferenceView>() + 4 * components;
+        4 * numbers + self.references.len() * each
+    }
+
     /// How probable a view is at each of those that lie within two corners of the map, and are far
     /// along the way.
     pub(crate) fn similar(
         &self,
+        components: &[f32],
         view: &LoggedView,
         [low, high]: &[Point3<f64>; 2],
     ) -> Vec<Similar> {
-        let components = self.model.components(view);
-        let seen = self.field.at(&components);
+        let seen = self.field.at(components);
         let similar = { self.references.iter().enumerate() }.filter_map(|(number, other)| {
             let position = other.position?;
             let is_within = low <= &position && &position <= high;
             (is_within && self.is_apart(other, view)).then(|| Similar {
                 position,
-                log_likelihood: seen.log_likelihood(number, &components),
+                log_likelihood: seen.log_likelihood(number, components),
             })
         });
         similar.collect()
@@ -185,8 +201,7 @@ impl ViewMap {
 }
 
 impl ViewModel {
-    /// The components of a view.
-    fn components(&self, view: &LoggedView) -> Vec<f32> {
+    fn components(&self, view: &LoggedView) -> Option<Vec<f32>> {
         let of = (view.sample.agent, view.sample.session);
         let own = self
             .centres
@@ -199,13 +214,21 @@ impl ViewModel {
             .collect();
         let columns = self.projection.chunks_exact(centred.len().max(1));
         let mut components: Vec<f32> = columns.map(|column| dot(column, &centred)).collect();
-        let length = dot(&components, &components).sqrt().max(f32::MIN_POSITIVE);
+        let length = dot(&components, &components).sqrt();
+        // What is left of a view that is as its mean is rounding errors.
+        let centred = dot(&centred, &centred).sqrt();
+        let is_shown = centred > LEAST * dot(&view.vector, &view.vector).sqrt();
+        if !(is_shown && length.is_normal()) {
+            return None;
+        }
         #[expect(clippy::cast_precision_loss, reason = "at most some hundreds")]
         let factor = (components.len() as f32).sqrt() / length;
         for component in &mut components {
             *component *= factor;
         }
-        components
+        { components.iter() }
+            .all(|component| component.is_finite())
+            .then_some(components)
     }
 
     fn is_sound(&self, length: usize) -> bool {
