@@ -4,6 +4,7 @@ mod appearance;
 mod descriptor;
 mod keyframes;
 mod levenberg_marquardt;
+mod particle_numbers;
 mod recognition;
 mod relocalisation;
 mod sequences;

@@ -9,6 +9,7 @@ use state::{Counted, state_of_struct};
 
 use super::view_map::{Similar, ViewMap};
 use crate::keyframes::SampleKey;
+use crate::particle_numbers::{floats, pair};
 use crate::similarity::LoggedView;
 use crate::tuning::tracking as tuning;
 use crate::view::View;
@@ -448,21 +449,4 @@ fn in_body_axes(covariance: &Matrix6<f64>, rotation: &UnitQuaternion<f64>) -> Po
     turn.fixed_view_mut::<3, 3>(0, 0).copy_from(&inverse);
     turn.fixed_view_mut::<3, 3>(3, 3).copy_from(&inverse);
     PoseCovariance::from_matrix(&(turn * covariance * turn.transpose()))
-}
-
-/// Two numbers of mean 0 and variance 1, nearly normal: sums of three uniform ones (Irwin & Hall
-/// 1927), since logarithms and cosines would be most of the cost of a step.
-fn pair(draws: &mut Seeded) -> [f64; 2] {
-    [(); 2].map(|()| {
-        let sum = draws.uniform() + draws.uniform() + draws.uniform();
-        2.0 * (sum - 1.5)
-    })
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "metres and radians, to seven digits"
-)]
-fn floats<const N: usize>(numbers: [f64; N]) -> [f32; N] {
-    numbers.map(|number| number as f32)
 }

@@ -10,6 +10,7 @@ use state::{Counted, state_of_struct};
 use super::cells::{Cells, beside, key_of};
 use super::model::Scores;
 use crate::keyframes::SampleKey;
+use crate::particle_numbers::{floats, pair};
 use crate::tuning::particles as tuning;
 
 /// Where the agent may be.
@@ -387,21 +388,4 @@ fn normalise(particles: &mut [Particle]) {
         let share = (f64::from(particle.weight) / whole) as f32;
         particle.weight = share;
     }
-}
-
-/// Two numbers of mean 0 and variance 1, nearly normal: sums of three uniform ones (Irwin & Hall
-/// 1927), since logarithms and cosines would be most of the cost of a step.
-fn pair(draws: &mut Seeded) -> [f64; 2] {
-    [(); 2].map(|()| {
-        let sum = draws.uniform() + draws.uniform() + draws.uniform();
-        2.0 * (sum - 1.5)
-    })
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "metres and radians, to seven digits"
-)]
-fn floats<const N: usize>(numbers: [f64; N]) -> [f32; N] {
-    numbers.map(|number| number as f32)
 }
