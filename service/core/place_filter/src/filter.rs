@@ -4,6 +4,7 @@ use geometry::PoseCovariance;
 use nalgebra::{Isometry3, Point3, Vector3};
 use state::state_of_struct;
 
+use crate::compass::{HeadingModel, HeadingSenses, Stretch};
 use crate::field::Field;
 use crate::follow::{Measured, Measurement, Senses, measurements};
 use crate::search::{Found, Search, Seeker};
@@ -29,12 +30,14 @@ pub struct PlaceFilter {
     window: Window,
     senses: Senses,
     search: Search,
+    heading: HeadingSenses,
 }
 
 state_of_struct!(PlaceFilter {
     window,
     senses,
-    search
+    search,
+    heading
 });
 
 impl PlaceFilter {
@@ -45,6 +48,28 @@ impl PlaceFilter {
         let step_m = self.step_m(field);
         self.window
             .add(level.channel, &level.in_odom, &at, level.value, step_m)
+    }
+
+    /// Takes in a level beside a known heading \[rad\], where the agent is by motion alone \[m\].
+    /// Answers what its channel is to learn, at times.
+    pub fn teach_heading(
+        &mut self,
+        level: (u8, f64),
+        heading_rad: f64,
+        in_odom: &Vector3<f64>,
+    ) -> Option<Stretch> {
+        self.heading.teach(level, heading_rad, in_odom)
+    }
+
+    /// Takes in a level of a compass, with the heading by motion alone \[rad\].
+    pub fn take_heading(&mut self, level: (u8, f64), model: &HeadingModel, in_odom_rad: f64) {
+        self.heading.take(level, model, in_odom_rad);
+    }
+
+    /// The turn of the frame of odometry in the map as compasses tell it, and its standard
+    /// deviation \[rad\]; `None` without any.
+    pub fn turn_rad(&self) -> Option<(f64, f64)> {
+        self.heading.turn_rad()
     }
 
     /// What the latest node teaches of its channels: channel, level, and the levels before with
@@ -103,6 +128,7 @@ impl PlaceFilter {
     pub fn cut(&mut self) {
         self.window = Window::default();
         self.search = Search::default();
+        self.heading = HeadingSenses::default();
         self.senses.settle();
     }
 

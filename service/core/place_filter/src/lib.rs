@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod compass;
 mod field;
 mod filter;
 mod follow;
@@ -12,6 +13,7 @@ mod tuning;
 mod variogram;
 mod window;
 
+pub use compass::{Compass, HeadingModel, Stretch};
 pub use field::Field;
 pub use filter::{PlaceFilter, SensedLevel};
 pub use follow::{Measured, Measurement};

@@ -203,3 +203,25 @@ pub(crate) mod search {
     /// Largest deviation of the heading of an answer \[rad\].
     pub(crate) const HEADING_SD_MAX_RAD: f64 = 0.2;
 }
+
+/// Compasses.
+pub(crate) mod compass {
+    /// Length of a stretch, from end to end, along which an agent turns and an error lasts \[m\].
+    pub(crate) const STRETCH_M: f64 = 8.0;
+    /// Fewest levels of a stretch.
+    pub(crate) const LEVELS_MIN: u32 = 8;
+    /// Most channels that an agent teaches at a time.
+    pub(crate) const CHANNELS_MAX: usize = 16;
+    /// Factor by which a stretch fades with the next one: the latest fifty count.
+    pub(crate) const KEPT: f64 = 0.98;
+    /// Rayleigh's statistic from which on directions are not of all sides: chance exceeds it with a
+    /// probability of e⁻¹², for each of four factors and some tests one after the other.
+    pub(crate) const SURE: f64 = 12.0;
+    /// Largest spread about the heading that is told, in that of the headings: beyond, levels and
+    /// headings go together because agents mostly look the same way.
+    pub(crate) const SPREAD: f64 = 0.25;
+    /// Least variance of either error \[rad²\]: a degree.
+    pub(crate) const VARIANCE_MIN: f64 = 3e-4;
+    /// Rate at which the turn of an agent's odometry follows: that drifts, and noise does not last.
+    pub(crate) const LATELY: f64 = 0.1;
+}

@@ -353,6 +353,9 @@ pub(crate) mod similarity {
     pub(crate) const PROBABILITY_MIN: f64 = 0.1;
     /// Weight of "nowhere" against a view of which nothing is known.
     pub(crate) const NOWHERE: f64 = 0.5;
+    /// Range beyond which views are not compared in pairs \[m\]: four lengths of the kernel of the
+    /// cells, by which they tell more. Lasers and cameras have ranges of 1 to 8 m, Wi-Fi of 30 m.
+    pub(crate) const COARSE_M: f64 = 16.0;
     /// Ranges within which views are matched by a map that has been relaxed.
     pub(crate) const GATE_RANGES: f64 = 6.0;
     /// Bounds of the depth of a match: logarithm of its odds.
@@ -456,6 +459,10 @@ pub(crate) mod particles {
     /// Standard deviation of the factor of lengths, and of its step: that of steps on foot.
     pub(crate) const SCALE_SD: f64 = 0.05;
     pub(crate) const SCALE_STEP: f64 = 0.004;
+    /// Probability that other senses mislead about the turn, and part of independent evidence that
+    /// they are with each view: most of their error lasts.
+    pub(crate) const MISLED: f64 = 0.05;
+    pub(crate) const TURN_TEMPER: f64 = 0.1;
     /// Particles so near to the mode make up the estimate, across and up \[m\].
     pub(crate) const NEAR_M: f64 = 10.0;
     pub(crate) const NEAR_Z_M: f64 = 2.0;
@@ -472,9 +479,9 @@ pub(crate) mod claims {
     pub(crate) const WEIGHT: f64 = 0.3;
     /// Log odds from which on a claim is made \[nats\]. They are learned from agents whose own
     /// poses err and while the map grows, and understate how often later claims are right.
-    pub(crate) const SURE: f64 = 1.2;
+    pub(crate) const SURE: f64 = 0.8;
     /// Views one after the other that must be so sure: chance does not last.
-    pub(crate) const TIMES: u8 = 2;
+    pub(crate) const TIMES: u8 = 4;
     /// Log odds down to which the pose of an agent that was found is corrected \[nats\].
     pub(crate) const FOLLOWED: f64 = 0.0;
     /// Factor by which what was learned fades with a claim: the latest fifty count.

@@ -60,6 +60,9 @@ impl Fold<'_> {
         let Some(in_odom) = self.estimator.in_odom(number) else {
             return;
         };
+        if self.head((channel, level.value()), &in_odom) {
+            return self.go_on_seeking();
+        }
         let sensed = SensedLevel {
             channel,
             value: level.value(),

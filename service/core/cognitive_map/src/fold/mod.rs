@@ -9,6 +9,7 @@ mod following;
 mod forgetting;
 mod guidance;
 mod header;
+mod headings;
 mod levels;
 mod localization;
 mod motion;

@@ -94,10 +94,12 @@ impl Fold<'_> {
         let is_placed = self.agent.placed() && !self.keyframes.is_kidnapped(number);
         let is_followed = is_placed && self.keyframes.is_waking(number);
         if is_placed && !is_followed {
-            self.keyframes.teach_cells(view);
+            self.keyframes
+                .teach_cells(view, self.agent.filter.turn_rad());
             return false;
         }
-        let Some(found) = self.keyframes.wake(view) else {
+        let turn = self.agent.filter.turn_rad();
+        let Some(found) = self.keyframes.wake(view, turn) else {
             return false;
         };
         let estimate = ExternalEstimate {

@@ -20,3 +20,9 @@ pub(super) const OWN_SURER: f64 = 2.0;
 /// Standard deviation of the vertical of an agent that wakes up, put down upright, and of one that
 /// got lost \[rad\]. Source: who is lost for long was often wrong about the vertical before.
 pub(super) const UPRIGHT_SD_RAD: (f64, f64) = (0.07, 0.25);
+/// Variance of the heading up to which an agent teaches whether levels tell it \[rad²\]. Source: a
+/// deviation of 9 degrees is below what compasses in buildings err by.
+pub(super) const TEACHING_RAD2: f64 = 0.15 * 0.15;
+/// Least length of the body's x axis as seen from above for it to have a heading: 60 degrees up or
+/// down.
+pub(super) const UPRIGHT_MIN: f64 = 0.5;

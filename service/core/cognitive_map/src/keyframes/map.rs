@@ -100,9 +100,21 @@ impl KeyframeMap {
         if !track.is_some_and(|track| track.is_in_map() && !track.needs_keyframe) {
             return;
         }
+        if self.is_coarse(view) {
+            return self.recognition.remember(view);
+        }
         for revisit in self.recognition.view(view, &self.graph.chains) {
             self.graph.close(&revisit);
         }
+    }
+
+    /// Whether views of this channel say too little one by one.
+    fn is_coarse(&self, view: &View<'_>) -> bool {
+        let Some(number) = self.recognition.channel_of(view) else {
+            return false;
+        };
+        let learned = self.graph.learned.iter();
+        { learned }.any(|learned| learned.channel == number && learned.is_coarse())
     }
 
     /// Whether what an agent of the map saw lately contradicts its estimate.
@@ -137,18 +149,22 @@ impl KeyframeMap {
     /// An agent that does not know where it is sees something. Answers where it is, once that is
     /// known to better than `sd_max_m`.
     pub fn seek(&mut self, view: &View<'_>, sd_max_m: f64) -> Option<Relocalised> {
+        if self.is_coarse(view) {
+            return None;
+        }
         self.recognition.seek(view, sd_max_m, &self.graph.chains)
     }
 
     /// Learns from the view of an agent that knows where it is what views say of cells.
-    pub fn teach_cells(&mut self, view: &View<'_>) {
-        self.recognition.teach_cells(view);
+    /// `turn` is that of its odometry in the map as compasses tell it, and the deviation \[rad\].
+    pub fn teach_cells(&mut self, view: &View<'_>, turn: Option<(f64, f64)>) {
+        self.recognition.teach_cells(view, turn);
     }
 
     /// An agent that does not know where it is sees something. Answers where among the cells of
-    /// the map it is, once that is sure.
-    pub fn wake(&mut self, view: &View<'_>) -> Option<Found> {
-        self.recognition.wake(view)
+    /// the map it is, once that is sure. `turn` is as for [`teach_cells`](Self::teach_cells).
+    pub fn wake(&mut self, view: &View<'_>, turn: Option<(f64, f64)>) -> Option<Found> {
+        self.recognition.wake(view, turn)
     }
 
     /// Whether an agent that was found among the cells is still followed there.

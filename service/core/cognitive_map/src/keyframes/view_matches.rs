@@ -36,15 +36,18 @@ impl RelaxationCopy {
     /// Beyond the most keyframes of [`Matching`], maps are compared by some of them, evenly spaced.
     /// Those between move with the one before.
     pub(super) fn match_views(&mut self, log: &ViewLog, matching: &Matching) -> bool {
-        let channels = Similarity::of_channels(log, matching.views_max);
+        let mut channels = Similarity::of_channels(log, matching.views_max);
         self.set_learned(channels.iter().map(|channel| *channel.learned()).collect());
+        channels.retain(|channel| !channel.learned().is_coarse());
         let view_maps = channels.iter().map(|channel| channel.view_map().clone());
         self.set_view_maps(view_maps.collect());
         let ranges = channels.iter().map(|channel| channel.learned().range_m);
-        let Some(range_m) = ranges.min_by(f64::total_cmp) else {
-            return false;
-        };
         let before = Arc::clone(&self.graph().matches);
+        let Some(range_m) = ranges.min_by(f64::total_cmp) else {
+            // What has turned out to say so little no longer holds the map.
+            self.set_matches(Arc::default());
+            return !before.is_empty();
+        };
         let n_views: usize = { channels.iter() }
             .map(|channel| channel.samples().count())
             .sum();

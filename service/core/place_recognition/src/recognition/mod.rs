@@ -68,6 +68,11 @@ impl PlaceRecognition {
         &self.views.log
     }
 
+    /// The number of the channel of a view, if anything was seen on it before.
+    pub fn channel_of(&self, view: &View<'_>) -> Option<u8> {
+        self.views.known_channel(view)
+    }
+
     /// The channels of views: number, name, numbers of a view, and how many of its views are
     /// logged.
     pub fn channels(&self) -> impl Iterator<Item = (u8, &str, u16, usize)> {
@@ -152,15 +157,16 @@ impl PlaceRecognition {
         self.views.bytes() + self.waking.bytes() + self.trackers.bytes() + particles
     }
 
-    /// Learns from the view of an agent that knows where it is what views say of cells.
-    pub fn teach_cells(&mut self, view: &View<'_>) {
-        self.waking.teach(view, self.revision);
+    /// Learns from the view of an agent that knows where it is what views say of cells. `turn` is
+    /// that of its odometry in the map by other senses, and the deviation \[rad\].
+    pub fn teach_cells(&mut self, view: &View<'_>, turn: Option<(f64, f64)>) {
+        self.waking.teach(view, turn, self.revision);
     }
 
     /// A view of an agent that does not know where it is; answers the pose among the cells of the
-    /// map, once that is sure.
-    pub fn wake(&mut self, view: &View<'_>) -> Option<Found> {
-        self.waking.seek(view, self.revision)
+    /// map, once that is sure. `turn` is as for [`teach_cells`](Self::teach_cells).
+    pub fn wake(&mut self, view: &View<'_>, turn: Option<(f64, f64)>) -> Option<Found> {
+        self.waking.seek(view, turn, self.revision)
     }
 
     /// Whether an agent that was found among the cells is still followed there.

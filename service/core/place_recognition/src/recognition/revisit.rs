@@ -27,6 +27,11 @@ pub struct Revisit {
 }
 
 impl PlaceRecognition {
+    /// Remembers what an agent in the map sees, where single views say too little for revisits.
+    pub fn remember(&mut self, view: &View<'_>) {
+        self.views.add(view, self.revision);
+    }
+
     /// Remembers what an agent in the map sees. Answers the revisits that end with this view: an
     /// earlier stretch was seen along the present one, and many views agree.
     pub fn view(&mut self, view: &View<'_>, keyframes: &dyn Keyframes) -> Vec<Revisit> {

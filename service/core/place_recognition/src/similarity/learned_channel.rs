@@ -1,6 +1,7 @@
 //! What is known of a channel of views.
 
 use crate::tuning::log::VIEWS_MAX;
+use crate::tuning::similarity::COARSE_M;
 use state::state_of_struct;
 
 /// What was learned of a channel when its views were last matched.
@@ -29,6 +30,12 @@ state_of_struct!(LearnedChannel {
 });
 
 impl LearnedChannel {
+    /// Whether views are alike over so far that pairs of them say less than odometry does. Agents
+    /// are still found among the cells by them.
+    pub fn is_coarse(&self) -> bool {
+        self.range_m > COARSE_M
+    }
+
     /// Whether one that was read from a checkpoint is one.
     pub fn is_sound(&self) -> bool {
         let numbers = [self.range_m, self.information_nats, self.independence];

@@ -22,7 +22,7 @@ use crate::views::ShortText;
 use cells::{Alike, Cells, key_of};
 use claims::Claims;
 use model::CellModel;
-use particles::{Filter, Mode};
+use particles::{Filter, Mode, Moved};
 
 /// A channel of views.
 #[derive(Clone, Debug)]
@@ -81,7 +81,7 @@ pub(crate) struct Waking {
 
 impl Waking {
     /// Learns from the view of an agent that knows where it is.
-    pub(crate) fn teach(&mut self, view: &View<'_>, revision: u64) {
+    pub(crate) fn teach(&mut self, view: &View<'_>, turn: Option<(f64, f64)>, revision: u64) {
         let diagonal = view.covariance.matrix().diagonal();
         let sd_m = diagonal.fixed_rows::<3>(0).max().max(0.0).sqrt();
         if sd_m > tuning::SD_M_MAX {
@@ -104,7 +104,7 @@ impl Waking {
         let own = self.cells.find(channel, key_of(&at));
         known.model.learn(&alike, own);
         if known.model.is_telling() && sd_m <= tuning::SHADOW_SD_M_MAX {
-            self.shadow(view, channel, &alike, revision);
+            self.shadow(view, turn, (channel, &alike), revision);
         }
         #[expect(clippy::cast_possible_truncation, reason = "a weight")]
         let weight = (1.0 / (1.0 + (sd_m / tuning::SURE_M).powi(2))) as f32;
@@ -145,7 +145,13 @@ impl Waking {
     }
 
     /// Finds out with an agent that knows where it is how often a claim would be right.
-    fn shadow(&mut self, view: &View<'_>, channel: u8, alike: &[Alike], revision: u64) {
+    fn shadow(
+        &mut self,
+        view: &View<'_>,
+        turn: Option<(f64, f64)>,
+        (channel, alike): (u8, &[Alike]),
+        revision: u64,
+    ) {
         let sample = view.sample;
         let own = { self.filters.iter() }.position(|filter| filter.is_shadow);
         let number = own.unwrap_or_else(|| {
@@ -164,7 +170,14 @@ impl Waking {
         }
         let known = &mut self.channels[usize::from(channel)];
         let scores = known.model.scores(alike);
-        filter.step(&view.in_odom, &scores, &self.cells);
+        filter.step(
+            &Moved {
+                in_odom: view.in_odom,
+                turn,
+            },
+            &scores,
+            &self.cells,
+        );
         if let Some(mode) = filter.mode(&self.cells) {
             note_alike(filter, &mode, alike, &self.cells);
             known.claims.learn(filter, &mode, &view.pose);
@@ -172,7 +185,12 @@ impl Waking {
     }
 
     /// A view of an agent that does not know where it is; answers where, once that is sure.
-    pub(crate) fn seek(&mut self, view: &View<'_>, revision: u64) -> Option<Found> {
+    pub(crate) fn seek(
+        &mut self,
+        view: &View<'_>,
+        turn: Option<(f64, f64)>,
+        revision: u64,
+    ) -> Option<Found> {
         let channel = self.known_channel(view)?;
         let known = self.channels.get(usize::from(channel))?;
         let is_large = self.cells.count(channel) >= tuning::CELLS_LARGE;
@@ -197,7 +215,14 @@ impl Waking {
         if filter.has_claimed && filter.n_views >= tuning::FOLLOWED {
             return None;
         }
-        filter.step(&view.in_odom, &scores, &self.cells);
+        filter.step(
+            &Moved {
+                in_odom: view.in_odom,
+                turn,
+            },
+            &scores,
+            &self.cells,
+        );
         let mode = filter.mode(&self.cells)?;
         note_alike(filter, &mode, &alike, &self.cells);
         let covariance = known.claims.claim(filter, &mode)?;

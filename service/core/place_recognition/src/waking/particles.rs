@@ -69,6 +69,15 @@ state_of_struct!(Filter {
     particles as Counted<u16>
 });
 
+/// How an agent has moved.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moved {
+    /// Its pose by motion alone.
+    pub(super) in_odom: Isometry3<f64>,
+    /// The turn of that in the map by other senses, and the deviation \[rad\].
+    pub(super) turn: Option<(f64, f64)>,
+}
+
 /// Where most particles are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mode {
@@ -96,7 +105,8 @@ impl Filter {
     }
 
     /// Takes in a view.
-    pub(super) fn step(&mut self, in_odom: &Isometry3<f64>, scores: &Scores, cells: &Cells) {
+    pub(super) fn step(&mut self, moved: &Moved, scores: &Scores, cells: &Cells) {
+        let Moved { in_odom, turn } = moved;
         let seed = u64::from(self.agent) << 32 | u64::from(self.n_views);
         let mut draws = Seeded(random::bits(
             seed,
@@ -111,11 +121,18 @@ impl Filter {
         let within = scores.within.clamp(tuning::WITHIN.0, tuning::WITHIN.1);
         let numerator = if self.particles.is_empty() {
             let temper_of_draw = temper.max(tuning::FIRST);
-            self.particles = draw(tuning::COUNT, temper_of_draw, scores, cells, &mut draws);
+            self.particles = draw(
+                tuning::COUNT,
+                (temper_of_draw, *turn),
+                scores,
+                cells,
+                &mut draws,
+            );
             normalise(&mut self.particles);
             mean_within * (1.0 - self.without)
         } else {
             self.go(in_odom, &mut draws);
+            self.turn(turn);
             let outside = (-temper * within).min(0.0) - tuning::HOLE;
             let mut of_cell = vec![f32::NAN; cells.all.len()];
             for (cell, score) in &scores.cells {
@@ -140,7 +157,7 @@ impl Filter {
             let all = old + fresh;
             let n_fresh = tuning::COUNT / tuning::FRESH;
             self.resample(tuning::COUNT - n_fresh, old / all, &mut draws);
-            let mut new = draw(n_fresh, temper, scores, cells, &mut draws);
+            let mut new = draw(n_fresh, (temper, *turn), scores, cells, &mut draws);
             normalise(&mut new);
             #[expect(clippy::cast_possible_truncation, reason = "a share")]
             let share = (fresh / all) as f32;
@@ -179,6 +196,33 @@ impl Filter {
                 scale + tuning::SCALE_STEP * d,
             ]);
             (particle.turn_rad, particle.scale) = (turn, scale);
+        }
+    }
+
+    /// Weighs the particles among themselves by what other senses say of their turn: whose errors
+    /// last says the same with each view.
+    fn turn(&mut self, turn: &Option<(f64, f64)>) {
+        let Some((turn_rad, sd_rad)) = *turn else {
+            return;
+        };
+        let sum = |particles: &[Particle]| -> f64 {
+            particles.iter().map(|each| f64::from(each.weight)).sum()
+        };
+        let before = sum(&self.particles);
+        for particle in &mut self.particles {
+            let off = (f64::from(particle.turn_rad) - turn_rad + TAU / 2.0).rem_euclid(TAU);
+            let deviations = (off - TAU / 2.0) / sd_rad;
+            let fits = (-0.5 * deviations * deviations).exp();
+            let gain = tuning::MISLED + (1.0 - tuning::MISLED) * fits;
+            #[expect(clippy::cast_possible_truncation, reason = "a weight")]
+            let weight = (f64::from(particle.weight) * gain.powf(tuning::TURN_TEMPER)) as f32;
+            particle.weight = weight;
+        }
+        let after = sum(&self.particles);
+        for particle in &mut self.particles {
+            #[expect(clippy::cast_possible_truncation, reason = "a weight")]
+            let weight = (f64::from(particle.weight) * before / after) as f32;
+            particle.weight = weight;
         }
     }
 
@@ -341,7 +385,7 @@ impl Particle {
 /// filter's.
 fn draw(
     count: usize,
-    temper: f64,
+    (temper, turn): (f64, Option<(f64, f64)>),
     scores: &Scores,
     cells: &Cells,
     draws: &mut Seeded,
@@ -362,12 +406,18 @@ fn draw(
         let (number, score) = scores.cells[index];
         let middle = cells.get(number)?.middle();
         let [x, y] = [middle.x, middle.y].map(|x| x + (draws.uniform() - 0.5) * side_m);
-        let [scale, _] = pair(draws);
+        let [scale, off] = pair(draws);
+        let turn_rad = match turn {
+            Some((turn_rad, sd_rad)) if draws.uniform() >= tuning::MISLED => {
+                turn_rad + sd_rad * off
+            }
+            _ => draws.uniform() * TAU,
+        };
         let [x, y, z, turn_rad, scale, weight] = floats([
             x,
             y,
             middle.z,
-            draws.uniform() * TAU,
+            turn_rad,
             1.0 + tuning::SCALE_SD * scale,
             ((tuning::TEMPER - temper) * f64::from(score)).exp(),
         ]);

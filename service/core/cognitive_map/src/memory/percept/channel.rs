@@ -1,7 +1,7 @@
 //! Channels: what percepts are sensed on.
 
 use crate::input::Label;
-use place_filter::{Kernel, Variogram};
+use place_filter::{Compass, Kernel, Variogram};
 use state::{CorruptState, Moments, State, StateReader, StateWriter, state_of_struct};
 
 /// Least deviation that a level is compared with, as a part of the deviation of its channel's
@@ -47,13 +47,16 @@ pub struct Channel {
     pub(super) levels: Moments,
     /// How levels go together; empty for descriptors.
     pub(super) variogram: Variogram,
+    /// Whether levels tell the heading; nothing for descriptors.
+    pub(super) compass: Compass,
 }
 
 state_of_struct!(Channel {
     label,
     kind,
     levels,
-    variogram
+    variogram,
+    compass
 });
 
 impl Channel {
@@ -65,6 +68,7 @@ impl Channel {
             kind,
             levels,
             variogram: Variogram::default(),
+            compass: Compass::default(),
         }
     }
 

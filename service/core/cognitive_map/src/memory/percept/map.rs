@@ -7,7 +7,7 @@ use super::level::{LEVEL_MAX, LevelMemory, LevelTrace, Sensed, surprise};
 use super::{Channel, ChannelId, ChannelKind, Expected, FeltPercept, PerceptCue, Remembered};
 use crate::input::{Descriptor, Label};
 use crate::memory::ids::PlaceId;
-use place_filter::{Kernel, Trace};
+use place_filter::{HeadingModel, Kernel, Stretch, Trace};
 use state::{CorruptState, PageItems, PagedVec, StateWriter};
 
 /// Most channels of a space. What is sensed on further ones is counted and stays in the journal.
@@ -108,6 +108,18 @@ impl PerceptMap {
         if let Some(channel) = self.channels.get_mut(usize::from(channel), revision) {
             channel.variogram.learn(value, earlier);
         }
+    }
+
+    /// A channel learns whether its levels tell the heading.
+    pub(crate) fn learn_heading(&mut self, channel: u8, stretch: &Stretch, revision: u64) {
+        if let Some(channel) = self.channels.get_mut(usize::from(channel), revision) {
+            channel.compass.learn(stretch);
+        }
+    }
+
+    /// How a channel tells the heading; `None` for one that does not.
+    pub(crate) fn heading_model(&self, channel: u8) -> Option<&HeadingModel> {
+        self.channels.get(usize::from(channel))?.compass.tells()
     }
 
     /// What a channel tells about a position.

@@ -1,0 +1,126 @@
+//! Robots whose levels tell their heading.
+
+use std::f64::consts::{PI, TAU};
+
+use cognitive_map::{CognitiveMap, Motion, PoseNoise, SampleBody, Settings};
+use nalgebra::{UnitQuaternion, Vector3};
+use random::Seeded;
+
+use crate::journal::{Robot, level, start_pose};
+
+/// Step of a robot \[m\].
+const STEP_M: f64 = 0.25;
+
+/// A robot that goes about a hall.
+struct Walker {
+    robot: Robot,
+    heading_rad: f64,
+    random: Seeded,
+    /// Error of its compass that lasts \[rad\].
+    lasting_rad: f64,
+}
+
+impl Walker {
+    /// One that is told where it stands.
+    fn new(map: &mut CognitiveMap, heading_rad: f64, seed: u64) -> Self {
+        let mut walker = Self::untold(map, heading_rad, seed);
+        let start = start_pose([0.0; 3], [0.0, 0.0, heading_rad]);
+        walker.robot.sample(map, start);
+        walker
+    }
+
+    fn untold(map: &mut CognitiveMap, heading_rad: f64, seed: u64) -> Self {
+        let mut random = Seeded(seed);
+        Self {
+            robot: Robot::enrol(map),
+            heading_rad,
+            lasting_rad: 0.1 * random.normal(),
+            random,
+        }
+    }
+
+    /// Goes so many steps, with odometry whose turns err by a deviation with each; a level is that
+    /// of the heading.
+    fn roam(&mut self, map: &mut CognitiveMap, steps: u32, sd_rad: f64, level_of: Level) {
+        for step in 0..steps {
+            let turn_rad = 0.05 * (0.02 * f64::from(step)).sin();
+            self.heading_rad += turn_rad;
+            let read_rad = turn_rad + sd_rad * self.random.normal();
+            let noise = PoseNoise::new([0.01, 0.01, 0.0], [0.0, 0.0, sd_rad]).unwrap();
+            let read = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), read_rad);
+            let motion =
+                Motion::from_increment([STEP_M, 0.0, 0.0], read.coords.into(), Some(noise));
+            self.robot.sample(map, SampleBody::Motion(motion.unwrap()));
+            let noise_rad = self.lasting_rad + 0.1 * self.random.normal();
+            let told = level_of(self.heading_rad, noise_rad, &mut self.random);
+            self.robot.sample(map, level("compass", told, [0.0; 3]));
+        }
+    }
+
+    fn off_rad(&self, map: &CognitiveMap) -> f64 {
+        let (_, _, yaw) = self.robot.pose(map).rotation.euler_angles();
+        (yaw - self.heading_rad + PI).rem_euclid(TAU) - PI
+    }
+}
+
+/// A level of a heading, with an error of that.
+type Level = fn(f64, f64, &mut Seeded) -> f64;
+
+/// A map in which forty robots with good odometry have gone about with a sensor.
+fn taught(level_of: Level) -> CognitiveMap {
+    let mut map = CognitiveMap::new(Settings::default());
+    for number in 0_u32..40 {
+        let heading_rad = 2.4 * f64::from(number);
+        let mut walker = Walker::new(&mut map, heading_rad, 100 + u64::from(number));
+        walker.roam(&mut map, 60, 1e-3, level_of);
+    }
+    map
+}
+
+/// How far off the headings of robots are with poor odometry, root mean square \[rad\].
+fn off_rad(map: &CognitiveMap, level_of: Level) -> f64 {
+    let squared = (1..=12_u64).map(|seed| {
+        let mut map = map.clone();
+        let mut walker = Walker::new(&mut map, 1.0, seed);
+        walker.roam(&mut map, 400, 0.05, level_of);
+        walker.off_rad(&map).powi(2)
+    });
+    (squared.sum::<f64>() / 12.0).sqrt()
+}
+
+/// A compass in a phone: degrees, clockwise from north, which lies somewhere in the map.
+fn degrees(heading_rad: f64, error_rad: f64, _: &mut Seeded) -> f64 {
+    (73.0 - (heading_rad + error_rad).to_degrees()).rem_euclid(360.0)
+}
+
+#[test]
+fn a_robot_is_held_by_its_compass() {
+    let radians: Level = |heading_rad, error_rad, _| heading_rad + error_rad;
+    for (name, level_of) in [("radians", radians), ("degrees", degrees as Level)] {
+        let off_rad = off_rad(&taught(level_of), level_of);
+        assert!(off_rad < 0.3, "{name}: {off_rad}");
+    }
+}
+
+#[test]
+fn levels_that_tell_no_heading_change_none() {
+    let alone: Level = |_, _, _| 0.0;
+    let field: Level = |_, _, random| 40.0 + 5.0 * random.normal();
+    let since_start: Level = |_, error_rad, _| error_rad;
+    for level_of in [alone, field, since_start] {
+        // Four hundred errors of 0.05.
+        let off_rad = off_rad(&taught(level_of), level_of);
+        assert!(off_rad > 0.7, "{off_rad}");
+    }
+}
+
+#[test]
+fn robots_without_a_start_pose_teach_no_compass() {
+    let mut map = CognitiveMap::new(Settings::default());
+    for number in 0_u32..40 {
+        let mut walker = Walker::untold(&mut map, f64::from(number), number.into());
+        walker.roam(&mut map, 60, 1e-3, degrees);
+    }
+    let off_rad = off_rad(&map, degrees);
+    assert!(off_rad > 0.7, "{off_rad}");
+}
