@@ -20,5 +20,5 @@ pub use keyframes::{Keyframes, SampleKey};
 pub use recognition::{Guess, Part, PlaceRecognition, Relocalised, Revisit};
 pub use similarity::{LearnedChannel, Similarity, ViewLog, ViewMatch};
 pub use tracking::{Tracked, ViewMap};
-pub use view::View;
+pub use view::{SensedTurn, View};
 pub use waking::Found;

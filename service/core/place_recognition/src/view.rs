@@ -22,6 +22,15 @@ pub struct View<'a> {
     pub vector: &'a [f32],
 }
 
+/// How the frame of an agent's odometry is turned in the map about the vertical, by other senses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensedTurn {
+    /// The turn \[rad\].
+    pub rad: f64,
+    /// Its standard deviation, most of which lasts \[rad\].
+    pub sd_rad: f64,
+}
+
 impl View<'_> {
     /// Position of the body in the map \[m\].
     pub(crate) fn position(&self) -> Point3<f64> {

@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, RowVector6, UnitQuaternion, Vector3};
 use super::apply::Fold;
 use super::tuning::{TEACHING_RAD2, UPRIGHT_MIN};
 use crate::estimator::LevelRow;
+use crate::keyframes::SensedTurn;
 use geometry::PoseCovariance;
 
 impl Fold<'_> {
@@ -45,6 +46,12 @@ impl Fold<'_> {
             self.update_pose();
         }
         true
+    }
+
+    /// How the frame of the agent's odometry is turned in the map, as compasses tell it.
+    pub(super) fn sensed_turn(&self) -> Option<SensedTurn> {
+        let (rad, sd_rad) = self.agent.filter.turn_rad()?;
+        Some(SensedTurn { rad, sd_rad })
     }
 }
 

@@ -94,11 +94,10 @@ impl Fold<'_> {
         let is_placed = self.agent.placed() && !self.keyframes.is_kidnapped(number);
         let is_followed = is_placed && self.keyframes.is_waking(number);
         if is_placed && !is_followed {
-            self.keyframes
-                .teach_cells(view, self.agent.filter.turn_rad());
+            self.keyframes.teach_cells(view, self.sensed_turn());
             return false;
         }
-        let turn = self.agent.filter.turn_rad();
+        let turn = self.sensed_turn();
         let Some(found) = self.keyframes.wake(view, turn) else {
             return false;
         };

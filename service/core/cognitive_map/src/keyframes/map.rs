@@ -2,7 +2,9 @@
 
 use geometry::PoseCovariance;
 use nalgebra::Isometry3;
-use place_recognition::{Found, Guess, PlaceRecognition, Relocalised, SampleKey, View, ViewLog};
+use place_recognition::{
+    Found, Guess, PlaceRecognition, Relocalised, SampleKey, SensedTurn, View, ViewLog,
+};
 
 use super::graph::KeyframeGraph;
 use super::moment::Moment;
@@ -156,14 +158,14 @@ impl KeyframeMap {
     }
 
     /// Learns from the view of an agent that knows where it is what views say of cells.
-    /// `turn` is that of its odometry in the map as compasses tell it, and the deviation \[rad\].
-    pub fn teach_cells(&mut self, view: &View<'_>, turn: Option<(f64, f64)>) {
+    /// `turn` is that of its odometry in the map as compasses tell it.
+    pub fn teach_cells(&mut self, view: &View<'_>, turn: Option<SensedTurn>) {
         self.recognition.teach_cells(view, turn);
     }
 
     /// An agent that does not know where it is sees something. Answers where among the cells of
     /// the map it is, once that is sure. `turn` is as for [`teach_cells`](Self::teach_cells).
-    pub fn wake(&mut self, view: &View<'_>, turn: Option<(f64, f64)>) -> Option<Found> {
+    pub fn wake(&mut self, view: &View<'_>, turn: Option<SensedTurn>) -> Option<Found> {
         self.recognition.wake(view, turn)
     }
 

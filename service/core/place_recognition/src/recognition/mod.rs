@@ -14,7 +14,7 @@ use crate::sequences::ViewMemory;
 use crate::similarity::ViewLog;
 use crate::tracking::{Tracked, Tracker, ViewMap};
 use crate::tuning::tracking::{AGENTS_MAX, IDLE_RECORDS};
-use crate::view::View;
+use crate::view::{SensedTurn, View};
 use crate::waking::{Found, Waking};
 use state::PagedVec;
 
@@ -158,14 +158,14 @@ impl PlaceRecognition {
     }
 
     /// Learns from the view of an agent that knows where it is what views say of cells. `turn` is
-    /// that of its odometry in the map by other senses, and the deviation \[rad\].
-    pub fn teach_cells(&mut self, view: &View<'_>, turn: Option<(f64, f64)>) {
+    /// that of its odometry in the map by other senses.
+    pub fn teach_cells(&mut self, view: &View<'_>, turn: Option<SensedTurn>) {
         self.waking.teach(view, turn, self.revision);
     }
 
     /// A view of an agent that does not know where it is; answers the pose among the cells of the
     /// map, once that is sure. `turn` is as for [`teach_cells`](Self::teach_cells).
-    pub fn wake(&mut self, view: &View<'_>, turn: Option<(f64, f64)>) -> Option<Found> {
+    pub fn wake(&mut self, view: &View<'_>, turn: Option<SensedTurn>) -> Option<Found> {
         self.waking.seek(view, turn, self.revision)
     }
 

@@ -17,7 +17,7 @@ use state::{
 use crate::similarity::logged;
 use crate::tuning::log::NUMBERS_MAX;
 use crate::tuning::waking as tuning;
-use crate::view::View;
+use crate::view::{SensedTurn, View};
 use crate::views::ShortText;
 use cells::{Alike, Cells, key_of};
 use claims::Claims;
@@ -81,7 +81,7 @@ pub(crate) struct Waking {
 
 impl Waking {
     /// Learns from the view of an agent that knows where it is.
-    pub(crate) fn teach(&mut self, view: &View<'_>, turn: Option<(f64, f64)>, revision: u64) {
+    pub(crate) fn teach(&mut self, view: &View<'_>, turn: Option<SensedTurn>, revision: u64) {
         let diagonal = view.covariance.matrix().diagonal();
         let sd_m = diagonal.fixed_rows::<3>(0).max().max(0.0).sqrt();
         if sd_m > tuning::SD_M_MAX {
@@ -148,7 +148,7 @@ impl Waking {
     fn shadow(
         &mut self,
         view: &View<'_>,
-        turn: Option<(f64, f64)>,
+        turn: Option<SensedTurn>,
         (channel, alike): (u8, &[Alike]),
         revision: u64,
     ) {
@@ -188,7 +188,7 @@ impl Waking {
     pub(crate) fn seek(
         &mut self,
         view: &View<'_>,
-        turn: Option<(f64, f64)>,
+        turn: Option<SensedTurn>,
         revision: u64,
     ) -> Option<Found> {
         let channel = self.known_channel(view)?;

@@ -12,6 +12,7 @@ use super::model::Scores;
 use crate::keyframes::SampleKey;
 use crate::particle_numbers::{floats, pair};
 use crate::tuning::particles as tuning;
+use crate::view::SensedTurn;
 
 /// Where the agent may be.
 #[derive(Clone, Copy, Debug)]
@@ -74,8 +75,8 @@ state_of_struct!(Filter {
 pub(super) struct Moved {
     /// Its pose by motion alone.
     pub(super) in_odom: Isometry3<f64>,
-    /// The turn of that in the map by other senses, and the deviation \[rad\].
-    pub(super) turn: Option<(f64, f64)>,
+    /// The turn of that in the map by other senses.
+    pub(super) turn: Option<SensedTurn>,
 }
 
 /// Where most particles are.
@@ -132,7 +133,9 @@ impl Filter {
             mean_within * (1.0 - self.without)
         } else {
             self.go(in_odom, &mut draws);
-            self.turn(turn);
+            if let Some(turn) = turn {
+                self.turn(turn);
+            }
             let outside = (-temper * within).min(0.0) - tuning::HOLE;
             let mut of_cell = vec![f32::NAN; cells.all.len()];
             for (cell, score) in &scores.cells {
@@ -201,17 +204,14 @@ impl Filter {
 
     /// Weighs the particles among themselves by what other senses say of their turn: whose errors
     /// last says the same with each view.
-    fn turn(&mut self, turn: &Option<(f64, f64)>) {
-        let Some((turn_rad, sd_rad)) = *turn else {
-            return;
-        };
+    fn turn(&mut self, turn: &SensedTurn) {
         let sum = |particles: &[Particle]| -> f64 {
             particles.iter().map(|each| f64::from(each.weight)).sum()
         };
         let before = sum(&self.particles);
         for particle in &mut self.particles {
-            let off = (f64::from(particle.turn_rad) - turn_rad + TAU / 2.0).rem_euclid(TAU);
-            let deviations = (off - TAU / 2.0) / sd_rad;
+            let off = (f64::from(particle.turn_rad) - turn.rad + TAU / 2.0).rem_euclid(TAU);
+            let deviations = (off - TAU / 2.0) / turn.sd_rad;
             let fits = (-0.5 * deviations * deviations).exp();
             let gain = tuning::MISLED + (1.0 - tuning::MISLED) * fits;
             #[expect(clippy::cast_possible_truncation, reason = "a weight")]
@@ -385,7 +385,7 @@ impl Particle {
 /// filter's.
 fn draw(
     count: usize,
-    (temper, turn): (f64, Option<(f64, f64)>),
+    (temper, turn): (f64, Option<SensedTurn>),
     scores: &Scores,
     cells: &Cells,
     draws: &mut Seeded,
@@ -408,9 +408,7 @@ fn draw(
         let [x, y] = [middle.x, middle.y].map(|x| x + (draws.uniform() - 0.5) * side_m);
         let [scale, off] = pair(draws);
         let turn_rad = match turn {
-            Some((turn_rad, sd_rad)) if draws.uniform() >= tuning::MISLED => {
-                turn_rad + sd_rad * off
-            }
+            Some(turn) if draws.uniform() >= tuning::MISLED => turn.rad + turn.sd_rad * off,
             _ => draws.uniform() * TAU,
         };
         let [x, y, z, turn_rad, scale, weight] = floats([
