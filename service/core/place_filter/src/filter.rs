@@ -61,15 +61,23 @@ impl PlaceFilter {
         self.heading.teach(level, heading_rad, in_odom)
     }
 
-    /// Takes in a level of a compass, with the heading by motion alone \[rad\].
-    pub fn take_heading(&mut self, level: (u8, f64), model: &HeadingModel, in_odom_rad: f64) {
-        self.heading.take(level, model, in_odom_rad);
+    /// Takes in a level of a compass, with the heading by motion alone \[rad\] and where the agent is
+    /// by that \[m\]. Answers at times the turn of the frame of odometry in the map \[rad\], by which
+    /// the heading is to be corrected.
+    pub fn take_heading(
+        &mut self,
+        level: (u8, f64),
+        model: &HeadingModel,
+        in_odom: (f64, &Vector3<f64>),
+    ) -> Option<f64> {
+        self.heading.take(level, model, in_odom)
     }
 
     /// The turn of the frame of odometry in the map as compasses tell it, and its standard
-    /// deviation \[rad\]; `None` without any.
-    pub fn turn_rad(&self) -> Option<(f64, f64)> {
-        self.heading.turn_rad()
+    /// deviation \[rad\], of an agent that is somewhere by motion alone \[m\]; `None` where it has
+    /// heard no compass on the way there.
+    pub fn turn_rad(&self, in_odom: &Vector3<f64>) -> Option<(f64, f64)> {
+        self.heading.turn_rad(in_odom)
     }
 
     /// What the latest node teaches of its channels: channel, level, and the levels before with

@@ -206,13 +206,15 @@ pub(crate) mod search {
 
 /// Compasses.
 pub(crate) mod compass {
-    /// Length of a stretch, from end to end, along which an agent turns and an error lasts \[m\].
+    /// Way of a stretch, along which an agent turns and an error lasts \[m\]: iron in floors and
+    /// walls misleads for some metres.
     pub(crate) const STRETCH_M: f64 = 8.0;
     /// Fewest levels of a stretch.
     pub(crate) const LEVELS_MIN: u32 = 8;
     /// Most channels that an agent teaches at a time.
     pub(crate) const CHANNELS_MAX: usize = 16;
-    /// Factor by which a stretch fades with the next one: the latest fifty count.
+    /// Factor by which what was learned fades with the first stretch of a session: the latest fifty
+    /// sessions count.
     pub(crate) const KEPT: f64 = 0.98;
     /// Rayleigh's statistic from which on directions are not of all sides: chance exceeds it with a
     /// probability of e⁻¹², for each of four factors and some tests one after the other.
@@ -220,8 +222,18 @@ pub(crate) mod compass {
     /// Largest spread about the heading that is told, in that of the headings: beyond, levels and
     /// headings go together because agents mostly look the same way.
     pub(crate) const SPREAD: f64 = 0.25;
-    /// Least variance of either error \[rad²\]: a degree.
-    pub(crate) const VARIANCE_MIN: f64 = 3e-4;
-    /// Rate at which the turn of an agent's odometry follows: that drifts, and noise does not last.
+    /// Least spread of the headings, 1 less the length of the mean unit vector: that of a deviation
+    /// of 0.3 rad. Agents that always look the same way tell no compass from a constant.
+    pub(crate) const HEADINGS: f64 = 0.05;
+    /// Least variance of the error that lasts, six degrees, and of the noise about it, one degree
+    /// \[rad²\]. Source: what phones and robots in buildings err by, however well they agree so far.
+    pub(crate) const LASTING_MIN_RAD2: f64 = 0.01;
+    pub(crate) const NOISE_MIN_RAD2: f64 = 3e-4;
+    /// Way of a step, whose levels count as one \[m\].
+    pub(crate) const STEP_M: f64 = 1.0;
+    /// Way without a level of a compass after which what it told is no longer used \[m\].
+    pub(crate) const HEARD_M: f64 = 16.0;
+    /// Rate at which the turn of an agent's odometry follows with a step: that drifts, and noise does
+    /// not last.
     pub(crate) const LATELY: f64 = 0.1;
 }

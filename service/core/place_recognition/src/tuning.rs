@@ -353,9 +353,13 @@ pub(crate) mod similarity {
     pub(crate) const PROBABILITY_MIN: f64 = 0.1;
     /// Weight of "nowhere" against a view of which nothing is known.
     pub(crate) const NOWHERE: f64 = 0.5;
-    /// Range beyond which views are not compared in pairs \[m\]: four lengths of the kernel of the
-    /// cells, by which they tell more. Lasers and cameras have ranges of 1 to 8 m, Wi-Fi of 30 m.
-    pub(crate) const COARSE_M: f64 = 16.0;
+    /// Range beyond which views are not compared in pairs, and down to which it stays so \[m\]: four
+    /// and three lengths of the kernel of the cells, by which they tell more. Lasers have ranges of
+    /// 1 to 8 m, Wi-Fi in a mall one of 30 m.
+    pub(crate) const COARSE_M: (f64, f64) = (16.0, 12.0);
+    /// Least such range in distances of views one after the other: shorter ones show how far apart
+    /// views are, not how far they are alike.
+    pub(crate) const COARSE_SPACINGS: f64 = 3.0;
     /// Ranges within which views are matched by a map that has been relaxed.
     pub(crate) const GATE_RANGES: f64 = 6.0;
     /// Bounds of the depth of a match: logarithm of its odds.

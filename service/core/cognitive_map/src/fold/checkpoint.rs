@@ -56,7 +56,8 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// that are new, version 16 no past that is held by live estimates, version 17 no searches by
 /// levels at four nodes, version 18 no trial of the noise of odometry, version 19 no
 /// veer in the estimate, version 20 no rotation as read beside a motion, version 21 no visits of
-/// places of objects, version 22 no views of maps and nobody tracked among them.
+/// places of objects, version 22 no views of maps and nobody tracked among them, version 23 no
+/// compasses.
 const VERSION: u16 = 24;
 
 const HEADER: u8 = 0;

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, RowVector6, UnitQuaternion, Vector3};
 
 use super::apply::Fold;
-use super::tuning::{TEACHING_RAD2, UPRIGHT_MIN};
+use super::tuning::{OWN_SURER, TEACHING_RAD2, UPRIGHT_MIN};
 use crate::estimator::LevelRow;
 use crate::keyframes::SensedTurn;
 use geometry::PoseCovariance;
@@ -19,25 +19,31 @@ impl Fold<'_> {
         let known = self.estimator.pose(number).filter(is_known);
         let known = known.and_then(|(pose, covariance)| Heading::of(&pose, &covariance));
         let at = &in_odom.translation.vector;
-        if let Some(known) = known.filter(|known| known.variance_rad2 <= TEACHING_RAD2) {
+        let model = self.percepts.heading_model(level.0, number).copied();
+        // Who is held by the compass cannot say how it errs.
+        let held = model.map_or(f64::INFINITY, |model| model.lasting_rad2() / OWN_SURER);
+        let is_sure = |known: &Heading| known.variance_rad2 <= TEACHING_RAD2.min(held);
+        if let Some(known) = known.filter(is_sure) {
             let stretch = self.agent.filter.teach_heading(level, known.rad, at);
             if let Some(stretch) = stretch {
-                self.percepts
-                    .learn_heading(level.0, &stretch, self.revision);
+                let taught = (number, &stretch);
+                self.percepts.learn_heading(level.0, taught, self.revision);
             }
         }
-        let Some(model) = self.percepts.heading_model(level.0).copied() else {
+        let Some(model) = model else {
             return false;
         };
         let Some((in_odom_rad, _)) = azimuth(&in_odom.rotation) else {
             return true;
         };
-        self.agent.filter.take_heading(level, &model, in_odom_rad);
+        let filter = &mut self.agent.filter;
+        let turn_rad = filter.take_heading(level, &model, (in_odom_rad, at));
         // Below what lasts of a compass's error it says nothing new.
-        if let Some(known) = known.filter(|known| known.variance_rad2 > model.lasting_rad2()) {
+        let known = known.filter(|known| known.variance_rad2 > model.lasting_rad2());
+        if let (Some(known), Some(turn_rad)) = (known, turn_rad) {
             let row = LevelRow {
                 jacobian: known.jacobian,
-                residual: wrapped(model.heading_rad(level.1) - known.rad),
+                residual: wrapped(turn_rad + in_odom_rad - known.rad),
                 variance: model.variance_rad2(),
                 floor: model.lasting_rad2(),
             };
@@ -50,7 +56,8 @@ impl Fold<'_> {
 
     /// How the frame of the agent's odometry is turned in the map, as compasses tell it.
     pub(super) fn sensed_turn(&self) -> Option<SensedTurn> {
-        let (rad, sd_rad) = self.agent.filter.turn_rad()?;
+        let in_odom = self.estimator.in_odom(self.agent_id.0)?;
+        let (rad, sd_rad) = self.agent.filter.turn_rad(&in_odom.translation.vector)?;
         Some(SensedTurn { rad, sd_rad })
     }
 }

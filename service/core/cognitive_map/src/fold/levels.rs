@@ -182,7 +182,6 @@ impl Fold<'_> {
         let spreads = spreads.into_iter().map(|spread| Measured { spread });
         let measured: Vec<_> = measurements.into_iter().zip(spreads).collect();
         if self.agent.filter.judge(&measured) {
-            self.agent.filter.cut();
             return self.lose_agent();
         }
         self.update_pose();

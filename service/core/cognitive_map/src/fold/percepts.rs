@@ -133,8 +133,10 @@ impl Fold<'_> {
         Status::of(self.agent, sd_m, is_doubted, self.settings) == Status::Lost
     }
 
-    /// What the agent sees contradicts its estimate: it may be anywhere from now on.
+    /// What the agent sees contradicts its estimate: it may be anywhere from now on, and what it
+    /// sensed before was elsewhere.
     pub(super) fn lose_agent(&mut self) {
+        self.agent.filter.cut();
         let moment = self.moment();
         self.end_trip(TripEnd::Gap);
         self.end_episode();

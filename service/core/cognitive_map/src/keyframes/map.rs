@@ -110,18 +110,22 @@ impl KeyframeMap {
         }
     }
 
-    /// Whether views of this channel say too little one by one.
+    /// Whether views of this channel say too little one by one, and are weighed among the cells.
     fn is_coarse(&self, view: &View<'_>) -> bool {
         let Some(number) = self.recognition.channel_of(view) else {
             return false;
         };
-        let learned = self.graph.learned.iter();
-        { learned }.any(|learned| learned.channel == number && learned.is_coarse())
+        let mut learned = self.graph.learned.iter();
+        learned.any(|learned| learned.channel == number && learned.is_coarse)
+            && self.recognition.is_sought_among_cells(view)
     }
 
     /// Whether what an agent of the map saw lately contradicts its estimate.
     /// `accepted` is the number of its sightings so far that agree with that.
     pub fn is_contradicted(&mut self, view: &View<'_>, accepted: u64) -> bool {
+        if self.is_coarse(view) {
+            return false;
+        }
         let chains = &self.graph.chains;
         // A view that fits where the agent is tracked speaks for it as a sighting does.
         let fitting = self.recognition.fitting_views(view.sample.agent);
@@ -152,6 +156,7 @@ impl KeyframeMap {
     /// known to better than `sd_max_m`.
     pub fn seek(&mut self, view: &View<'_>, sd_max_m: f64) -> Option<Relocalised> {
         if self.is_coarse(view) {
+            self.recognition.end_search(view.sample.agent);
             return None;
         }
         self.recognition.seek(view, sd_max_m, &self.graph.chains)

@@ -1,5 +1,6 @@
 //! Matches of views: what the whole map says of which views are of one place, and they of it.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3};
@@ -36,17 +37,24 @@ impl RelaxationCopy {
     /// Beyond the most keyframes of [`Matching`], maps are compared by some of them, evenly spaced.
     /// Those between move with the one before.
     pub(super) fn match_views(&mut self, log: &ViewLog, matching: &Matching) -> bool {
-        let mut channels = Similarity::of_channels(log, matching.views_max);
-        self.set_learned(channels.iter().map(|channel| *channel.learned()).collect());
-        channels.retain(|channel| !channel.learned().is_coarse());
+        let channels = Similarity::of_channels(log, matching.views_max);
+        let before = Arc::clone(&self.graph().learned);
+        let learned = |channel: &Similarity<'_>| channel.learned().after(&before);
+        self.set_learned(channels.iter().map(learned).collect());
+        let is_fine = |channel: &Similarity<'_>| !learned(channel).is_coarse;
+        let (channels, coarse): (Vec<_>, Vec<_>) = channels.into_iter().partition(is_fine);
+        // What has turned out to say so little no longer holds the map.
+        let coarse = coarse.iter().map(|channel| channel.learned().channel);
+        let coarse: BTreeSet<SampleKey> = coarse.flat_map(|one| log.samples_of(one)).collect();
+        let held = Arc::clone(&self.graph().matches);
+        let is_of_fine = |matched: &&ViewMatch| !coarse.contains(&matched.now);
+        self.set_matches(held.iter().filter(is_of_fine).copied().collect());
         let view_maps = channels.iter().map(|channel| channel.view_map().clone());
         self.set_view_maps(view_maps.collect());
         let ranges = channels.iter().map(|channel| channel.learned().range_m);
         let before = Arc::clone(&self.graph().matches);
         let Some(range_m) = ranges.min_by(f64::total_cmp) else {
-            // What has turned out to say so little no longer holds the map.
-            self.set_matches(Arc::default());
-            return !before.is_empty();
+            return before != held;
         };
         let n_views: usize = { channels.iter() }
             .map(|channel| channel.samples().count())
@@ -55,7 +63,7 @@ impl RelaxationCopy {
         if matching.needs_news && before.is_empty() {
             let news: f64 = channels.iter().map(Similarity::news_nats).sum();
             if news < another_map {
-                return false;
+                return before != held;
             }
         }
         let thinned = self.thinned(tuning::MATCHED_STEP * range_m, matching.keyframes_max);
@@ -75,10 +83,10 @@ impl RelaxationCopy {
             }
         }
         if before.is_empty() && best.copy.graph().matches.is_empty() {
-            return false;
+            return before != held;
         }
         self.adopt_thinned(&best.copy);
-        self.graph().matches != before
+        self.graph().matches != held
     }
 
     /// A copy relaxed by matches that were found wherever its keyframes are, and then, twice, by

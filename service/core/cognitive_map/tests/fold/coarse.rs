@@ -23,8 +23,8 @@ fn view(at: &Vector2<f64>, waves: &[(Vector2<f64>, f64)], random: &mut Seeded) -
     waves.iter().map(number).collect()
 }
 
-/// A robot that goes round the block again and again, and what of it is in the map.
-fn round(has_views: bool) -> (CognitiveMap, Robot) {
+/// The map of a robot that goes round the block again and again, and how far off it is \[m\].
+fn round(has_views: bool) -> (CognitiveMap, f64) {
     let mut random = Seeded(5);
     let mut wave = || {
         let wave = Vector2::new(random.normal(), random.normal());
@@ -50,18 +50,17 @@ fn round(has_views: bool) -> (CognitiveMap, Robot) {
             robot.sample(&mut map, descriptor("radio", &seen));
         }
     }
-    (map, robot)
+    let off_m = (robot.pose(&map).translation.vector.xy() - at).norm();
+    (map, off_m)
 }
 
 #[test]
-fn views_that_are_alike_over_tens_of_metres_move_no_past() {
-    let (map, robot) = round(true);
+fn views_that_are_alike_over_tens_of_metres_make_nothing_worse() {
+    let (map, off_m) = round(true);
     let channel = map.view_channels().next().unwrap();
     let learned = channel.learned.expect("views that say something");
-    assert!(learned.range_m > 16.0, "{learned:?}");
+    assert!(learned.range_m > 16.0 && learned.is_coarse, "{learned:?}");
     assert!(learned.information_nats > 0.5, "{learned:?}");
-    let (without, alone) = round(false);
-    let moved = alone.pose(&without).inv_mul(&robot.pose(&map));
-    assert!(moved.translation.vector.norm() < 1e-9, "{moved}");
-    assert_eq!(map.closure_count(), 0);
+    let (_, without_m) = round(false);
+    assert!(off_m < without_m + 1.0, "{off_m} {without_m}");
 }

@@ -52,8 +52,10 @@ impl Walker {
                 Motion::from_increment([STEP_M, 0.0, 0.0], read.coords.into(), Some(noise));
             self.robot.sample(map, SampleBody::Motion(motion.unwrap()));
             let noise_rad = self.lasting_rad + 0.1 * self.random.normal();
-            let told = level_of(self.heading_rad, noise_rad, &mut self.random);
-            self.robot.sample(map, level("compass", told, [0.0; 3]));
+            let mut random = Seeded(self.random.0);
+            if let Some(told) = level_of(self.heading_rad, noise_rad, &mut random) {
+                self.robot.sample(map, level("compass", told, [0.0; 3]));
+            }
         }
     }
 
@@ -63,8 +65,8 @@ impl Walker {
     }
 }
 
-/// A level of a heading, with an error of that.
-type Level = fn(f64, f64, &mut Seeded) -> f64;
+/// A level of a heading, with an error of that, if there is one.
+type Level = fn(f64, f64, &mut Seeded) -> Option<f64>;
 
 /// A map in which forty robots with good odometry have gone about with a sensor.
 fn taught(level_of: Level) -> CognitiveMap {
@@ -77,50 +79,79 @@ fn taught(level_of: Level) -> CognitiveMap {
     map
 }
 
-/// How far off the headings of robots are with poor odometry, root mean square \[rad\].
-fn off_rad(map: &CognitiveMap, level_of: Level) -> f64 {
-    let squared = (1..=12_u64).map(|seed| {
+/// How far off the headings of robots with poor odometry are in the end \[rad\].
+fn off_rad(map: &CognitiveMap, level_of: Level) -> Vec<f64> {
+    let off = (1..=12_u64).map(|seed| {
         let mut map = map.clone();
         let mut walker = Walker::new(&mut map, 1.0, seed);
         walker.roam(&mut map, 400, 0.05, level_of);
-        walker.off_rad(&map).powi(2)
+        walker.off_rad(&map)
     });
-    (squared.sum::<f64>() / 12.0).sqrt()
+    off.collect()
+}
+
+fn rms(values: &[f64]) -> f64 {
+    let squared: f64 = values.iter().map(|value| value * value).sum();
+    (squared / values.len() as f64).sqrt()
 }
 
 /// A compass in a phone: degrees, clockwise from north, which lies somewhere in the map.
-fn degrees(heading_rad: f64, error_rad: f64, _: &mut Seeded) -> f64 {
-    (73.0 - (heading_rad + error_rad).to_degrees()).rem_euclid(360.0)
+#[expect(clippy::unnecessary_wraps, reason = "a level that is always there")]
+fn degrees(heading_rad: f64, error_rad: f64, _: &mut Seeded) -> Option<f64> {
+    Some((73.0 - (heading_rad + error_rad).to_degrees()).rem_euclid(360.0))
 }
 
 #[test]
 fn a_robot_is_held_by_its_compass() {
-    let radians: Level = |heading_rad, error_rad, _| heading_rad + error_rad;
+    let radians: Level = |heading_rad, error_rad, _| Some(heading_rad + error_rad);
     for (name, level_of) in [("radians", radians), ("degrees", degrees as Level)] {
-        let off_rad = off_rad(&taught(level_of), level_of);
-        assert!(off_rad < 0.3, "{name}: {off_rad}");
+        let off_rad = rms(&off_rad(&taught(level_of), level_of));
+        assert!(off_rad < 0.4, "{name}: {off_rad}");
     }
+    let alone = rms(&off_rad(&taught(degrees), |_, _, _| None));
+    assert!(alone > 0.8, "{alone}");
 }
 
 #[test]
 fn levels_that_tell_no_heading_change_none() {
-    let alone: Level = |_, _, _| 0.0;
-    let field: Level = |_, _, random| 40.0 + 5.0 * random.normal();
-    let since_start: Level = |_, error_rad, _| error_rad;
-    for level_of in [alone, field, since_start] {
-        // Four hundred errors of 0.05.
-        let off_rad = off_rad(&taught(level_of), level_of);
-        assert!(off_rad > 0.7, "{off_rad}");
+    let without = off_rad(&taught(|_, _, _| None), |_, _, _| None);
+    let constant: Level = |_, _, _| Some(1e20);
+    let field: Level = |_, _, random| Some(40.0 + 5.0 * random.normal());
+    let error_alone: Level = |_, error_rad, _| Some(error_rad);
+    for level_of in [constant, field, error_alone] {
+        let with = off_rad(&taught(level_of), level_of);
+        let changed: Vec<f64> = with.iter().zip(&without).map(|(a, b)| a - b).collect();
+        assert!(rms(&changed) < 0.02, "{changed:?}");
     }
 }
 
 #[test]
 fn robots_without_a_start_pose_teach_no_compass() {
-    let mut map = CognitiveMap::new(Settings::default());
-    for number in 0_u32..40 {
-        let mut walker = Walker::untold(&mut map, f64::from(number), number.into());
-        walker.roam(&mut map, 60, 1e-3, degrees);
-    }
-    let off_rad = off_rad(&map, degrees);
-    assert!(off_rad > 0.7, "{off_rad}");
+    let roamed = |level_of: Level| {
+        let mut map = CognitiveMap::new(Settings::default());
+        for number in 0_u32..40 {
+            let mut walker = Walker::untold(&mut map, f64::from(number), number.into());
+            walker.roam(&mut map, 60, 1e-3, level_of);
+        }
+        off_rad(&map, level_of)
+    };
+    let (with, without) = (roamed(degrees), roamed(|_, _, _| None));
+    let changed: Vec<f64> = with.iter().zip(&without).map(|(a, b)| a - b).collect();
+    assert!(rms(&changed) < 0.02, "{changed:?}");
+}
+
+#[test]
+fn a_restart_while_a_compass_is_learned_and_used_makes_no_difference() {
+    let fold = |restarts: bool| {
+        let mut map = taught(degrees);
+        let mut walker = Walker::new(&mut map, 1.0, 9);
+        for _ in 0..40 {
+            walker.roam(&mut map, 10, 0.05, degrees);
+            if restarts {
+                map = CognitiveMap::restore(Settings::default(), map.checkpoint(0)).unwrap();
+            }
+        }
+        map.digest()
+    };
+    assert!(fold(true) == fold(false));
 }

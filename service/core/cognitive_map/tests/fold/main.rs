@@ -9,12 +9,12 @@ mod any_journal; // arbitrary journals
 mod astray; // robots that are carried off
 mod budgets; // what is forgotten, and when
 mod checkpoint; // pages out and in, damaged ones too
-mod coarse;
+mod coarse; // views that are alike over tens of metres
 mod correction; // what others see of an agent
 mod determinism; // the same records, the same map
 mod felt; // what was felt near a point, and who was there
-mod guidance;
-mod headings; // blockages, routes that are followed, pinned trips
+mod guidance; // blockages, routes that are followed, pinned trips
+mod headings; // levels that tell how robots are turned
 mod journal; // a robot that writes readable journals
 mod landmarks; // what sightings teach
 mod lessons; // objects that are taught at once

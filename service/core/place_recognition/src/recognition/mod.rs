@@ -169,6 +169,11 @@ impl PlaceRecognition {
         self.waking.seek(view, turn, self.revision)
     }
 
+    /// Whether agents that do not know where they are are sought among the cells by these views.
+    pub fn is_sought_among_cells(&self, view: &View<'_>) -> bool {
+        self.waking.is_sought_by(view)
+    }
+
     /// Whether an agent that was found among the cells is still followed there.
     pub fn is_waking(&self, agent: u32, session: u32) -> bool {
         self.waking.is_following(agent, session)

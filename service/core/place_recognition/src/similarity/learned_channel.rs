@@ -13,6 +13,9 @@ pub struct LearnedChannel {
     pub views: u32,
     /// Range of the channel: views are alike within it \[m\].
     pub range_m: f64,
+    /// Whether that is so far that a pair of views says less than odometry does. Agents are still
+    /// found among the cells by such views.
+    pub is_coarse: bool,
     /// Mean log of the likelihood ratio of two neighbours along the way to be within the range of
     /// one another, against far ones: what a pair of views says \[nats\]. Of the later half of the
     /// views, by what the earlier half teaches; not above zero where views say nothing.
@@ -25,15 +28,19 @@ state_of_struct!(LearnedChannel {
     channel,
     views,
     range_m,
+    is_coarse,
     information_nats,
     independence
 });
 
 impl LearnedChannel {
-    /// Whether views are alike over so far that pairs of them say less than odometry does. Agents
-    /// are still found among the cells by them.
-    pub fn is_coarse(&self) -> bool {
-        self.range_m > COARSE_M
+    /// The same after what was known of the channel before: one that was coarse is so until its
+    /// range is clearly shorter.
+    #[must_use]
+    pub fn after(mut self, before: &[Self]) -> Self {
+        let was_coarse = { before.iter() }.any(|one| one.channel == self.channel && one.is_coarse);
+        self.is_coarse |= was_coarse && self.range_m > COARSE_M.1;
+        self
     }
 
     /// Whether one that was read from a checkpoint is one.

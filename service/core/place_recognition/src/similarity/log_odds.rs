@@ -13,6 +13,8 @@ pub(super) struct Learned {
     /// Distance at which the similarity of views has fallen halfway to that of far ones, as the
     /// deviation of a Gaussian \[m\].
     pub(super) range_m: f64,
+    /// Distance of views one after the other \[m\].
+    pub(super) spacing_m: f64,
     /// Share of the evidence of a view that is its own: neighbours say nearly the same.
     pub(super) independence: f64,
     /// Log-odds of all pairs of views.
@@ -24,6 +26,12 @@ pub(super) struct Learned {
 }
 
 impl Learned {
+    /// Whether views are alike over more than so many metres, and over many views of a way: farther
+    /// apart than they are alike, views would show the same range.
+    pub(super) fn is_coarse(&self, least_m: f64) -> bool {
+        self.range_m > least_m.max(tuning::COARSE_SPACINGS * self.spacing_m)
+    }
+
     /// From the scores of all pairs of views and of neighbours; `None` if there are no far views,
     /// or near ones are no more alike.
     pub(super) fn of(
@@ -35,13 +43,14 @@ impl Learned {
         if far.len() < tuning::FAR_PAIRS / 100 {
             return None;
         }
-        let range_m = range_m(neighbours, &scores, &far)?;
+        let (range_m, spacing_m) = range_m(neighbours, &scores, &far)?;
         let backgrounds = backgrounds(runs, &scores);
         let near = near_features(neighbours, range_m, &backgrounds);
         let distant = far_features(&far, &scores, &backgrounds);
         let weights = logistic(&near, &distant)?;
         let mut learned = Self {
             range_m,
+            spacing_m,
             independence: 1.0,
             log_odds: DMatrix::zeros(0, 0),
             weights,
@@ -159,12 +168,13 @@ fn floor(value: f64) -> usize {
     value as usize
 }
 
-/// The range of a channel, from its views' neighbours along the way.
+/// The range of a channel, from its views' neighbours along the way, and the distance of the
+/// nearest of them.
 fn range_m(
     neighbours: &[NeighbourPair],
     scores: &DMatrix<f32>,
     far: &[(usize, usize)],
-) -> Option<f64> {
+) -> Option<(f64, f64)> {
     let mut pairs: Vec<(f64, f64)> = { neighbours.iter() }
         .map(|pair| (pair.distance_m, pair.score))
         .collect();
@@ -193,7 +203,7 @@ fn range_m(
         Some(class) => class.0 / tuning::HALF_HEIGHT,
         None => classes[classes.len() - 1].0,
     };
-    (range_m > 0.0).then_some(range_m)
+    (range_m > 0.0).then_some((range_m, classes[0].0))
 }
 
 /// How alike the most similar far views of each view are: log of their mean odds.

@@ -96,6 +96,7 @@ impl<'a> Similarity<'a> {
                 channel,
                 views: u32::try_from(runs.len()).unwrap_or(u32::MAX),
                 range_m: learned.range_m,
+                is_coarse: learned.is_coarse(tuning::COARSE_M.0),
                 information_nats: information_nats(&runs, &neighbours, &views, learned.range_m),
                 independence: learned.independence,
             },

@@ -136,6 +136,12 @@ impl ViewLog {
         self.n_new = 0;
     }
 
+    /// The samples of the views of a channel.
+    pub fn samples_of(&self, channel: u8) -> impl Iterator<Item = SampleKey> + '_ {
+        let own = { self.views.iter() }.filter(move |view| view.channel == channel);
+        own.map(|view| view.sample)
+    }
+
     /// Whether there is nothing in it.
     pub fn is_empty(&self) -> bool {
         self.views.len() == 0

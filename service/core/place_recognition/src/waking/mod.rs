@@ -232,6 +232,15 @@ impl Waking {
         })
     }
 
+    /// Whether agents that do not know where they are are sought among the cells by these views.
+    pub(crate) fn is_sought_by(&self, view: &View<'_>) -> bool {
+        let Some(channel) = self.known_channel(view) else {
+            return false;
+        };
+        let is_telling = self.channels[usize::from(channel)].model.is_telling();
+        is_telling && self.cells.count(channel) >= tuning::CELLS_LARGE
+    }
+
     /// Whether an agent was found and is still followed.
     pub(crate) fn is_following(&self, agent: u32, session: u32) -> bool {
         self.filters.iter().any(|filter| {

@@ -111,15 +111,22 @@ impl PerceptMap {
     }
 
     /// A channel learns whether its levels tell the heading.
-    pub(crate) fn learn_heading(&mut self, channel: u8, stretch: &Stretch, revision: u64) {
+    pub(crate) fn learn_heading(
+        &mut self,
+        channel: u8,
+        (agent, stretch): (u32, &Stretch),
+        revision: u64,
+    ) {
         if let Some(channel) = self.channels.get_mut(usize::from(channel), revision) {
-            channel.compass.learn(stretch);
+            channel.compass.learn(agent, stretch);
         }
     }
 
-    /// How a channel tells the heading; `None` for one that does not.
-    pub(crate) fn heading_model(&self, channel: u8) -> Option<&HeadingModel> {
-        self.channels.get(usize::from(channel))?.compass.tells()
+    /// How a channel tells the heading of an agent; `None` for one that does not.
+    pub(crate) fn heading_model(&self, channel: u8, agent: u32) -> Option<&HeadingModel> {
+        { self.channels.get(usize::from(channel))? }
+            .compass
+            .tells(agent)
     }
 
     /// What a channel tells about a position.
