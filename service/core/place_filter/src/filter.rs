@@ -61,9 +61,9 @@ impl PlaceFilter {
         self.heading.teach(level, heading_rad, in_odom)
     }
 
-    /// Takes in a level of a compass, with the heading by motion alone \[rad\] and where the agent is
-    /// by that \[m\]. Answers at times the turn of the frame of odometry in the map \[rad\], by which
-    /// the heading is to be corrected.
+    /// Takes in a level of a compass, with the heading by motion alone \[rad\] and where the agent
+    /// is by that \[m\]. Answers at times the turn of the frame of odometry in the map \[rad\], by
+    /// which the heading is to be corrected.
     pub fn take_heading(
         &mut self,
         level: (u8, f64),

@@ -226,14 +226,15 @@ pub(crate) mod compass {
     /// of 0.3 rad. Agents that always look the same way tell no compass from a constant.
     pub(crate) const HEADINGS: f64 = 0.05;
     /// Least variance of the error that lasts, six degrees, and of the noise about it, one degree
-    /// \[rad²\]. Source: what phones and robots in buildings err by, however well they agree so far.
+    /// \[rad²\]. Source: what phones and robots in buildings err by, however well they agreed so
+    /// far.
     pub(crate) const LASTING_MIN_RAD2: f64 = 0.01;
     pub(crate) const NOISE_MIN_RAD2: f64 = 3e-4;
     /// Way of a step, whose levels count as one \[m\].
     pub(crate) const STEP_M: f64 = 1.0;
     /// Way without a level of a compass after which what it told is no longer used \[m\].
     pub(crate) const HEARD_M: f64 = 16.0;
-    /// Rate at which the turn of an agent's odometry follows with a step: that drifts, and noise does
-    /// not last.
+    /// Rate at which the turn of an agent's odometry follows with a step: that drifts, and noise
+    /// does not last.
     pub(crate) const LATELY: f64 = 0.1;
 }

@@ -353,9 +353,9 @@ pub(crate) mod similarity {
     pub(crate) const PROBABILITY_MIN: f64 = 0.1;
     /// Weight of "nowhere" against a view of which nothing is known.
     pub(crate) const NOWHERE: f64 = 0.5;
-    /// Range beyond which views are not compared in pairs, and down to which it stays so \[m\]: four
-    /// and three lengths of the kernel of the cells, by which they tell more. Lasers have ranges of
-    /// 1 to 8 m, Wi-Fi in a mall one of 30 m.
+    /// Range beyond which views are not compared in pairs, and down to which it stays so \[m\]:
+    /// four and three lengths of the kernel of the cells, by which they tell more. Lasers have
+    /// ranges of 1 to 8 m, Wi-Fi in a mall one of 30 m.
     pub(crate) const COARSE_M: (f64, f64) = (16.0, 12.0);
     /// Least such range in distances of views one after the other: shorter ones show how far apart
     /// views are, not how far they are alike.
@@ -436,67 +436,6 @@ pub(crate) mod waking {
     pub(crate) const FOLLOWED: u32 = 96;
 }
 
-/// The particle filter.
-pub(crate) mod particles {
-    /// Particles.
-    pub(crate) const COUNT: usize = 3000;
-    /// One of so many is drawn anew with each view.
-    pub(crate) const FRESH: usize = 25;
-    /// Probability at first that the agent is where nothing is known.
-    pub(crate) const WITHOUT: f64 = 0.5;
-    /// Part of independent evidence that a view is: neighbours err alike.
-    pub(crate) const TEMPER: f64 = 0.3;
-    /// The same when particles are first drawn.
-    pub(crate) const FIRST: f64 = 0.5;
-    /// Bounds of the evidence of a view for the cells \[nats\].
-    pub(crate) const WITHIN: (f64, f64) = (-8.0, 3.0);
-    /// Evidence against a particle between the cells \[nats\].
-    pub(crate) const HOLE: f64 = 1.0;
-    /// Probability that an agent is somewhere else altogether with the next view.
-    pub(crate) const ANEW: f64 = 0.004;
-    /// Part of the probability of no cell that stays with a view, and what is added.
-    pub(crate) const OPEN: (f64, f64) = (0.999, 0.0005);
-    /// Standard deviation of the heading: of a view, and of the way \[rad, rad/√m\].
-    pub(crate) const TURN_SD: (f64, f64) = (0.005, 0.04);
-    /// The same of the position \[m, m/√m\].
-    pub(crate) const POSITION_SD: (f64, f64) = (0.15, 0.15);
-    /// Standard deviation of the factor of lengths, and of its step: that of steps on foot.
-    pub(crate) const SCALE_SD: f64 = 0.05;
-    pub(crate) const SCALE_STEP: f64 = 0.004;
-    /// Probability that other senses mislead about the turn, and part of independent evidence that
-    /// they are with each view: most of their error lasts.
-    pub(crate) const MISLED: f64 = 0.05;
-    pub(crate) const TURN_TEMPER: f64 = 0.1;
-    /// Particles so near to the mode make up the estimate, across and up \[m\].
-    pub(crate) const NEAR_M: f64 = 10.0;
-    pub(crate) const NEAR_Z_M: f64 = 2.0;
-}
+pub(crate) mod particles;
 
-/// Claims where an agent is.
-pub(crate) mod claims {
-    /// Fewest views.
-    pub(crate) const VIEWS_MIN: u32 = 3;
-    /// A claim is right up to this error, across and up \[m\].
-    pub(crate) const NEAR_M: f64 = 15.0;
-    pub(crate) const NEAR_Z_M: f64 = 2.5;
-    /// Weight of a view in what is learned: neighbours err alike.
-    pub(crate) const WEIGHT: f64 = 0.3;
-    /// Log odds from which on a claim is made \[nats\]. They are learned from agents whose own
-    /// poses err and while the map grows, and understate how often later claims are right.
-    pub(crate) const SURE: f64 = 0.8;
-    /// Views one after the other that must be so sure: chance does not last.
-    pub(crate) const TIMES: u8 = 4;
-    /// Log odds down to which the pose of an agent that was found is corrected \[nats\].
-    pub(crate) const FOLLOWED: f64 = 0.0;
-    /// Factor by which what was learned fades with a claim: the latest fifty count.
-    pub(crate) const KEPT: f64 = 0.98;
-    /// Fewest claims that say how often they are right.
-    pub(crate) const COUNT_MIN: f64 = 10.0;
-    /// Largest share of wrong ones at which claims are made at all.
-    pub(crate) const WRONG_MAX: f64 = 0.2;
-    /// Squared error of a claim in its variances: at first, and the largest that counts.
-    pub(crate) const RATIO: f64 = 2.0;
-    pub(crate) const RATIO_MAX: f64 = 10.0;
-    /// Least variance of a component \[m², rad²\].
-    pub(crate) const FLOOR: f64 = 1e-4;
-}
+pub(crate) mod claims;
