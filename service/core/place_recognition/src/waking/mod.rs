@@ -170,14 +170,7 @@ impl Waking {
         }
         let known = &mut self.channels[usize::from(channel)];
         let scores = known.model.scores(alike);
-        filter.step(
-            &Moved {
-                in_odom: view.in_odom,
-                turn,
-            },
-            &scores,
-            &self.cells,
-        );
+        filter.step(&Moved::of(view, turn), &scores, &self.cells);
         if let Some(mode) = filter.mode(&self.cells) {
             note_alike(filter, &mode, alike, &self.cells);
             known.claims.learn(filter, &mode, &view.pose);
@@ -191,12 +184,11 @@ impl Waking {
         turn: Option<SensedTurn>,
         revision: u64,
     ) -> Option<Found> {
-        let channel = self.known_channel(view)?;
-        let known = self.channels.get(usize::from(channel))?;
-        let is_large = self.cells.count(channel) >= tuning::CELLS_LARGE;
-        if !known.model.is_telling() || !self.is_best(channel) || !is_large {
+        if !self.is_sought_by(view) {
             return None;
         }
+        let channel = self.known_channel(view)?;
+        let known = self.channels.get(usize::from(channel))?;
         let vector = unit(view.vector)?;
         let alike = self.cells.alike(channel, &vector);
         let scores = known.model.scores(&alike);
@@ -215,14 +207,7 @@ impl Waking {
         if filter.has_claimed && filter.n_views >= tuning::FOLLOWED {
             return None;
         }
-        filter.step(
-            &Moved {
-                in_odom: view.in_odom,
-                turn,
-            },
-            &scores,
-            &self.cells,
-        );
+        filter.step(&Moved::of(view, turn), &scores, &self.cells);
         let mode = filter.mode(&self.cells)?;
         note_alike(filter, &mode, &alike, &self.cells);
         let covariance = known.claims.claim(filter, &mode)?;
@@ -237,8 +222,9 @@ impl Waking {
         let Some(channel) = self.known_channel(view) else {
             return false;
         };
-        let is_telling = self.channels[usize::from(channel)].model.is_telling();
-        is_telling && self.cells.count(channel) >= tuning::CELLS_LARGE
+        self.channels[usize::from(channel)].model.is_telling()
+            && self.is_best(channel)
+            && self.cells.count(channel) >= tuning::CELLS_LARGE
     }
 
     /// Whether an agent was found and is still followed.

@@ -12,7 +12,7 @@ use super::model::Scores;
 use crate::keyframes::SampleKey;
 use crate::particle_numbers::{floats, pair};
 use crate::tuning::particles as tuning;
-use crate::view::SensedTurn;
+use crate::view::{SensedTurn, View};
 
 /// Where the agent may be.
 #[derive(Clone, Copy, Debug)]
@@ -77,6 +77,15 @@ pub(super) struct Moved {
     pub(super) in_odom: Isometry3<f64>,
     /// The turn of that in the map by other senses.
     pub(super) turn: Option<SensedTurn>,
+}
+
+impl Moved {
+    pub(super) fn of(view: &View<'_>, turn: Option<SensedTurn>) -> Self {
+        Self {
+            in_odom: view.in_odom,
+            turn,
+        }
+    }
 }
 
 /// Where most particles are.
