@@ -10,6 +10,7 @@
 //! |---|---|
 //! | [`mrclam`] | the UTIAS multi-robot data sets |
 //! | [`nees`] | errors against their covariances |
+//! | [`coverage`] | how many positions lie within the ellipses of their covariances |
 //! | [`g2o`] | pose graphs |
 //! | [`tuc`] | the TUC data sets: odometry and place matches, many of them false |
 //! | [`victoria`] | Victoria Park, as text with odometry and sightings |
@@ -63,6 +64,7 @@
 //! Nothing here reads a clock or draws randomness that was not seeded. Only
 //! the functions called `load` touch files.
 
+pub mod coverage;
 pub mod csv;
 pub mod eval;
 pub mod g2o;

@@ -44,15 +44,14 @@ impl Nees {
         estimate: &Isometry3<f64>,
         covariance: &PoseCovariance,
     ) {
-        let spread = in_map(estimate, covariance);
-        let of_position: Matrix2<f64> = spread.fixed_view::<2, 2>(0, 0).into_owned();
-        let Some(inverse) = of_position.try_inverse() else {
+        let Some(squared) = squared_distance(truth_m, estimate, covariance) else {
             return;
         };
-        let error = (truth_m - estimate.translation.vector).xy();
-        let alone = |k: usize| error[k] * error[k] / of_position[(k, k)];
-        let together = error.dot(&(inverse * error)) / 2.0;
-        add_up(&mut self.of_positions, [alone(0), alone(1), together]);
+        let spread = in_map(estimate, covariance);
+        let error = truth_m - estimate.translation.vector;
+        let alone = |k: usize| error[k] * error[k] / spread[(k, k)];
+        let all = [alone(0), alone(1), squared / 2.0];
+        add_up(&mut self.of_positions, all);
         self.n_positions += 1.0;
     }
 
@@ -103,6 +102,21 @@ impl Nees {
             pose: of_pose(self.of_poses[1]),
         })
     }
+}
+
+/// Squared Mahalanobis distance of a true position \[m\] from an estimated pose in the plane, by
+/// the covariance of the estimate's error along and about its own axes; `None` if that has no
+/// inverse. Where covariances are honest it is distributed as χ² of two degrees of freedom.
+pub fn squared_distance(
+    truth_m: &Vector3<f64>,
+    estimate: &Isometry3<f64>,
+    covariance: &PoseCovariance,
+) -> Option<f64> {
+    let spread = in_map(estimate, covariance);
+    let of_position: Matrix2<f64> = spread.fixed_view::<2, 2>(0, 0).into_owned();
+    let inverse = of_position.try_inverse()?;
+    let error = (truth_m - estimate.translation.vector).xy();
+    Some(error.dot(&(inverse * error)))
 }
 
 /// The covariance in the plane (x, y, heading), along the axes of the map.

@@ -31,6 +31,7 @@ mod localize; // where samples of nobody were taken
 mod percepts; // what was felt and seen, recalled and predicted
 mod replay; // graphs and recordings through the experience map
 mod replay_objects; // objects learned and recognised, from files
+mod replay_real; // all recordings of a directory, by what they hold
 mod routes; // from here to there
 mod sequences; // what comes next, and where somebody was
 mod uniform; // one mistake, one answer; one event, one id; JSON for who asks

@@ -26,7 +26,7 @@ pub use input::{
     Sample, SampleBody, Sighting, SkipReason, Spacing, StartPose, Target, Touch, TouchLevel,
     TouchNoise,
 };
-pub use keyframes::{Guess, LearnedChannel, RelaxationJob, ViewChannel};
+pub use keyframes::{Guess, LearnedChannel, RelaxationJob, SampleKey, ViewChannel, ViewMatch};
 pub use memory::blockage::{BLOCKAGES_MAX, Ball, Blockage, BlockageId, Blocked};
 pub use memory::landmark::{Landmark, LandmarkId};
 pub use memory::object::{Identified, KnownObject};

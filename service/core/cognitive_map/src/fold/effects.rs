@@ -8,7 +8,7 @@ use super::apply::Fold;
 use crate::estimator::{AgentSighted, Effect, Estimator, FramesMerged};
 use crate::event::{Event, EventKind, LoopsClosed};
 use crate::input::{AgentId, Relation};
-use crate::keyframes::{LiveEstimates, Moment, Refined, RelaxationJob, ViewChannel};
+use crate::keyframes::{LiveEstimates, Moment, Refined, RelaxationJob, ViewChannel, ViewMatch};
 use crate::memory::place::PlaceId;
 use pose_graph::PoseGraph;
 
@@ -207,5 +207,10 @@ impl CognitiveMap {
     /// Number of loop closures that are accepted.
     pub fn closure_count(&self) -> usize {
         self.keyframes.graph.n_closures_accepted()
+    }
+
+    /// Matches of views by which the past is relaxed, as they were when it last was.
+    pub fn view_matches(&self) -> &[ViewMatch] {
+        self.keyframes.graph.view_matches()
     }
 }

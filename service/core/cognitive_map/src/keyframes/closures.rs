@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector6};
-use place_recognition::{Relocalised, Revisit, SampleKey, ViewLog};
+use place_recognition::{Relocalised, Revisit, SampleKey, ViewLog, ViewMatch};
 
 use super::constraint::{ClosureState, Constraint, composed};
 use super::constraints::Schedule;
@@ -119,6 +119,11 @@ impl KeyframeGraph {
     /// Number of matches of views by which the past is relaxed.
     pub fn n_view_matches(&self) -> usize {
         self.matches.len()
+    }
+
+    /// Matches of views by which the past is relaxed.
+    pub fn view_matches(&self) -> &[ViewMatch] {
+        &self.matches
     }
 
     /// Number of accepted closures.

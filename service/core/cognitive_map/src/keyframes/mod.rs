@@ -80,7 +80,9 @@ pub use graph::KeyframeGraph;
 pub use live_estimates::LiveEstimates;
 pub use map::KeyframeMap;
 pub use moment::Moment;
-pub use place_recognition::{Found, Guess, LearnedChannel, Relocalised, SensedTurn, View};
+pub use place_recognition::{
+    Found, Guess, LearnedChannel, Relocalised, SampleKey, SensedTurn, View, ViewMatch,
+};
 pub use refined::{Refined, RefinedAgent, RefinedLandmark, RefinedPose};
 pub use relaxation::Correction;
 pub use relaxation_job::RelaxationJob;

@@ -15,6 +15,10 @@ use crate::tracking::{ReferenceView, SessionCentre, ViewMap, ViewModel};
 use crate::tuning::similarity as tuning;
 use state::state_of_struct;
 
+/// Standard deviation of the distance of two views of one place along each axis, in ranges of
+/// their channel.
+const RANGE_SD: f64 = 0.5;
+
 /// Two samples at which an agent, or two, may have been at one place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewMatch {
@@ -29,6 +33,16 @@ pub struct ViewMatch {
 }
 
 impl ViewMatch {
+    /// Probability that they are of one place.
+    pub fn probability(&self) -> f64 {
+        -(-self.depth).exp_m1()
+    }
+
+    /// How far apart samples of one place are at most \[m\]: the range of the channel.
+    pub fn range_m(&self) -> f64 {
+        self.sd_m / RANGE_SD
+    }
+
     /// Whether a match that was read from a checkpoint is one.
     pub fn is_sound(&self) -> bool {
         self.sd_m.is_finite() && self.sd_m > 0.0 && self.depth.is_finite() && self.depth >= 0.0
@@ -213,7 +227,7 @@ impl<'a> Similarity<'a> {
         ViewMatch {
             now: self.runs.views[now].sample,
             then: self.runs.views[then].sample,
-            sd_m: 0.5 * self.learned.range_m,
+            sd_m: RANGE_SD * self.learned.range_m,
             depth: odds.ln_1p().clamp(tuning::DEPTH.0, tuning::DEPTH.1),
         }
     }

@@ -7,6 +7,9 @@ use cogmap_proto::limits::BATCH_SAMPLES_MAX;
 
 use super::setting::Setting;
 
+/// Most samples of a batch, unless another number is asked for.
+const BATCH: u16 = 64;
+
 /// Where samples go, and what is written and printed.
 #[derive(Debug, Args)]
 pub(super) struct ReplayArgs {
@@ -36,7 +39,7 @@ pub(super) struct ReplayArgs {
     #[arg(long, value_name = "NAME")]
     pub(super) space: Option<String>,
     /// Most samples of a batch. Changes nothing but the number of messages.
-    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..=4096))]
+    #[arg(long, default_value_t = BATCH, value_parser = clap::value_parser!(u16).range(1..=4096))]
     batch: u16,
     /// A setting of the space that is not the default, its value as JSON, e.g. `length_error_sd=0`.
     /// As often as there are some.
@@ -48,6 +51,21 @@ pub(super) struct ReplayArgs {
 }
 
 impl ReplayArgs {
+    /// Straight into the core, with these settings; nothing is written.
+    pub(super) fn in_core(setting: &[Setting]) -> Self {
+        Self {
+            out: None,
+            plot: false,
+            connect: None,
+            http: None,
+            token: None,
+            space: None,
+            batch: BATCH,
+            setting: setting.to_vec(),
+            json: false,
+        }
+    }
+
     /// Most samples of a batch.
     pub(super) fn batch(&self) -> usize {
         usize::from(self.batch).min(BATCH_SAMPLES_MAX)

@@ -14,7 +14,7 @@ const COVERED_M: f64 = 6.0;
 /// … and on the same floor: within this height \[m\].
 const FLOOR_M: f64 = 2.5;
 /// A first claim that is farther off than this is a false one \[m\].
-const FALSE_CLAIM_M: f64 = 15.0;
+pub(super) const FALSE_CLAIM_M: f64 = 15.0;
 
 /// An agent, what it saw where, and what the map claimed.
 #[derive(Debug)]
@@ -31,17 +31,17 @@ pub(super) struct Sighted<'a> {
 /// only those can be placed, the others should be left alone.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct Waking {
-    woken: usize,
-    covered: usize,
-    covered_placed: usize,
+    pub(super) woken: usize,
+    pub(super) covered: usize,
+    pub(super) covered_placed: usize,
     /// Median over covered agents of the median error in the plane \[m\].
-    median_error_m: Option<f64>,
+    pub(super) median_error_m: Option<f64>,
     /// Agents that were placed.
     claims: usize,
-    claims_uncovered: usize,
-    first_claims_over_15_m: usize,
+    pub(super) claims_uncovered: usize,
+    pub(super) first_claims_over_15_m: usize,
     /// Mean share of claims on a wrong floor.
-    wrong_floor: Option<f64>,
+    pub(super) wrong_floor: Option<f64>,
 }
 
 /// What the map claimed of an agent.

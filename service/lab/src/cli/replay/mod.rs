@@ -2,21 +2,29 @@
 
 mod arguments;
 mod case;
+mod columns;
 mod csv;
 mod csv_waking;
 mod errors;
 mod g2o;
 mod known;
+mod measured;
 mod mrclam;
 mod offline;
 mod online;
 mod outcome;
 mod points;
+mod position_claims;
+mod real;
+mod real_report;
+mod recording;
 mod replayed;
 mod report;
 mod room;
 mod scoring;
+mod sequence_recall;
 mod sequences;
+mod set_kind;
 mod setting;
 mod team;
 mod touch;
@@ -43,6 +51,9 @@ pub(in crate::cli) enum ReplayCommand {
     /// Tables with views: one agent's way is remembered, and the others are told where they are by
     /// their last views.
     Sequences(sequences::SequencesArgs),
+    /// All sets of such tables in a directory, each as it can be measured by what it holds: errors,
+    /// and how often what was claimed is right.
+    Real(real::RealArgs),
     /// Objects as touches, a place and a level each: learned, and touched again with noise.
     Touch(touch::TouchArgs),
     /// Objects as points with normals: learned from some, and recognised from others in any pose.
@@ -58,6 +69,7 @@ pub(super) fn run(command: &ReplayCommand) -> anyhow::Result<()> {
         ReplayCommand::Room(args) => room::run(args),
         ReplayCommand::Csv(args) => csv::run(args),
         ReplayCommand::Sequences(args) => sequences::run(args),
+        ReplayCommand::Real(args) => real::run(args),
         ReplayCommand::Touch(args) => touch::run(args),
         ReplayCommand::Points(args) => points::run(args),
     }

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use cogmap_proto::{SampleBatch, SpaceSettings};
-use cognitive_map::{AgentId, CognitiveMap, Record};
+use cognitive_map::{AgentId, CognitiveMap, Record, SampleKey, ViewMatch};
 
-use super::outcome::{Outcome, RobotOutcome};
+use super::outcome::{MatchedViews, Outcome, RobotOutcome};
 use super::team::TeamBatch;
 use cogmap::decode::{core_settings, records_of, trajectory_interval_ns};
 use cogmap::encode::{evidence, stamped};
@@ -40,6 +40,8 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
             samples: batch.clone(),
         };
         robot.next += batch.samples.len() as u64;
+        let stamps_ns = batch.samples.iter().map(|sample| sample.stamp_ns);
+        robot.stamps_ns.extend(stamps_ns);
         records_of(
             &Entry::Samples {
                 agent: robot.agent,
@@ -54,6 +56,9 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
             },
         );
     }
+    let view_matches = { map.view_matches().iter() }
+        .filter_map(|found| matched_views(found, &team))
+        .collect();
     let mut refined = refined_trajectories(&map);
     let finish = |(name, robot): (&str, Robot)| {
         let poses = refined.remove(name).unwrap_or_default();
@@ -67,6 +72,7 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
         trips: map.trip_count() as u64,
         landmarks: map.landmark_count() as u64,
         closures: Some(map.closure_count() as u64),
+        view_matches,
         times_s,
     })
 }
@@ -76,10 +82,26 @@ fn row(row: &trajectory::StampedPose) -> cogmap_proto::StampedPose {
     stamped(row.stamp_ns, &row.pose)
 }
 
+/// A match of views with the names of the robots and the stamps.
+fn matched_views(found: &ViewMatch, team: &BTreeMap<&str, Robot>) -> Option<MatchedViews> {
+    let seen = |key: &SampleKey| {
+        let (name, robot) = team.iter().find(|(_, robot)| robot.agent == key.agent)?;
+        let stamp_ns = robot.stamps_ns.get(usize::try_from(key.seq).ok()?)?;
+        Some(((*name).to_owned(), *stamp_ns))
+    };
+    Some(MatchedViews {
+        seen: [seen(&found.now)?, seen(&found.then)?],
+        range_m: found.range_m(),
+        probability: found.probability(),
+    })
+}
+
 #[derive(Default)]
 struct Robot {
     agent: u32,
     next: u64,
+    /// Of its samples, by their numbers.
+    stamps_ns: Vec<i64>,
     recorder: Recorder,
     outcome: RobotOutcome,
 }

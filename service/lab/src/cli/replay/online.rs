@@ -70,6 +70,7 @@ pub(super) fn replay(
         trips: info.trips,
         landmarks: info.landmarks,
         closures: None,
+        view_matches: Vec::new(),
         times_s: Vec::new(),
     })
 }

@@ -18,6 +18,8 @@ pub(super) struct Outcome {
     pub(super) landmarks: u64,
     /// Closures that are believed in the end, of a replay straight into the core.
     pub(super) closures: Option<u64>,
+    /// Of a replay straight into the core: matches of views that the map holds in the end.
+    pub(super) view_matches: Vec<MatchedViews>,
     /// What each sample took in the core \[s\]; nothing of a replay through a service.
     pub(super) times_s: Vec<f64>,
 }
@@ -33,6 +35,17 @@ pub(super) struct RobotOutcome {
     /// Of a replay straight into the core: poses in the map with the covariance that they had, a
     /// second apart.
     pub(super) beliefs: Vec<(StampedPose, PoseCovariance)>,
+}
+
+/// Two views that are held to be of one place.
+#[derive(Clone, Debug)]
+pub(super) struct MatchedViews {
+    /// The robot that saw each, and when \[ns\].
+    pub(super) seen: [(String, i64); 2],
+    /// How far apart views of one place are at most \[m\].
+    pub(super) range_m: f64,
+    /// That they are, as the map has it.
+    pub(super) probability: f64,
 }
 
 /// Times that samples took in the core \[ms\].

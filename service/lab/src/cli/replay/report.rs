@@ -120,6 +120,12 @@ impl Report {
         }
     }
 
+    /// The errors of each robot, by name.
+    pub(super) fn robots(&self) -> impl Iterator<Item = (&str, &Errors)> {
+        let robots = self.robots.iter();
+        robots.map(|(name, robot)| (name.as_str(), &robot.errors))
+    }
+
     /// The median over the robots of each error.
     pub(super) fn medians(&self) -> Errors {
         Errors::medians(&errors_of(&self.robots))

@@ -1,6 +1,7 @@
 //! How far estimates are from the truth.
 
 use cogmap::decode::stamped_pose;
+use cogmap_lab::coverage::Coverage;
 use cogmap_lab::nees::Nees;
 use cogmap_proto::StampedPose as Row;
 use nalgebra::Vector3;
@@ -73,6 +74,20 @@ impl Scoring {
             }
         }
         nees
+    }
+
+    /// How many of the poses that were believed lie within the ellipses of their covariances.
+    pub(super) fn coverage(&self, came_out: &RobotOutcome, known: &Known) -> Coverage {
+        let mut coverage = Coverage::default();
+        let Some(truth) = known.truth.as_ref().filter(|_| self.is_recorded) else {
+            return coverage;
+        };
+        for (belief, covariance) in &came_out.beliefs {
+            if let Some(truth_m) = truth.at(belief.stamp_ns) {
+                coverage.add(&truth_m, &stamped_pose(belief).pose, covariance);
+            }
+        }
+        coverage
     }
 }
 

@@ -1,11 +1,11 @@
 //! Whether what was said to be so likely came about so often.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Bounds of the bins.
 const BOUNDS: [f64; 11] = [0.0, 0.01, 0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95, 0.99];
 
-/// Probabilities that were said, and what came about.
+/// Probabilities that were said, and what came about. It is serialised as its bins.
 #[derive(Clone, Debug)]
 pub struct Calibration {
     sums: [(u64, f64, u64); BOUNDS.len()],
@@ -36,12 +36,25 @@ impl Default for Calibration {
     }
 }
 
+impl Serialize for Calibration {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.bins().serialize(serializer)
+    }
+}
+
 impl Calibration {
     /// Something was said to come about with a probability, and did or did not.
     pub fn add(&mut self, probability: f64, came: bool) {
         let bin = BOUNDS.partition_point(|bound| *bound <= probability).max(1) - 1;
         let sums = &mut self.sums[bin];
         *sums = (sums.0 + 1, sums.1 + probability, sums.2 + u64::from(came));
+    }
+
+    /// Takes in what another has.
+    pub fn add_all(&mut self, other: &Self) {
+        for (sums, more) in self.sums.iter_mut().zip(&other.sums) {
+            *sums = (sums.0 + more.0, sums.1 + more.1, sums.2 + more.2);
+        }
     }
 
     /// The bins that hold something.
