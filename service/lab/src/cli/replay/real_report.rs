@@ -77,13 +77,13 @@ impl RealReport {
             self.sessions(),
             self.routes(),
             self.positions(),
-            bins(
+            self.bins(
                 "answers to the last views, by their probability",
-                &self.calibration.answers,
+                Measured::answers,
             ),
-            bins(
+            self.bins(
                 "matches of views that maps held in the end, by their probability",
-                &self.calibration.view_matches,
+                |measured| measured.view_matches.clone(),
             ),
         ];
         let tables: Vec<String> = tables.into_iter().flatten().collect();
@@ -172,25 +172,25 @@ impl RealReport {
             of_sets.chain(of_all),
         )
     }
-}
 
-/// What was said to be so probable, and how often it was right.
-fn bins(title: &str, calibration: &Calibration) -> Option<String> {
-    let bins = calibration.bins();
-    let rows = bins.iter().map(|bin| {
-        vec![
-            format!("{:.2} to {:.2}", bin.from, bin.to),
-            format!("{:.3}", bin.said),
-            format!("{:.3}", bin.came),
-            format!("{:.3}", bin.sd),
-            bin.count.to_string(),
-        ]
-    });
-    table(
-        title,
-        (1, &["probability", "said", "right", "sd", "count"]),
-        rows,
-    )
+    /// What was said to be so probable in each set, and how often it was right.
+    fn bins(&self, title: &str, of: impl Fn(&Measured) -> Calibration) -> Option<String> {
+        let rows = self.sets.iter().flat_map(|(set, measured)| {
+            let bins = of(measured).bins().into_iter();
+            bins.map(move |bin| {
+                vec![
+                    set.clone(),
+                    format!("{:.2} to {:.2}", bin.from, bin.to),
+                    format!("{:.3}", bin.said),
+                    format!("{:.3}", bin.came),
+                    format!("{:.3}", bin.sd),
+                    bin.count.to_string(),
+                ]
+            })
+        });
+        let head = ["set", "probability", "said", "right", "sd", "count"];
+        table(title, (2, &head), rows)
+    }
 }
 
 /// A table under its title; none without a row. The first columns are to the left.
