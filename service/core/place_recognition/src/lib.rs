@@ -18,7 +18,7 @@ mod waking;
 pub use descriptor::dot;
 pub use keyframes::{Keyframes, SampleKey};
 pub use recognition::{Guess, Part, PlaceRecognition, Relocalised, Revisit};
-pub use similarity::{LearnedChannel, Similarity, ViewLog, ViewMatch};
+pub use similarity::{LearnedChannel, Similarity, Turned, ViewLog, ViewMatch};
 pub use tracking::{Tracked, ViewMap};
 pub use view::{SensedTurn, View};
 pub use waking::Found;

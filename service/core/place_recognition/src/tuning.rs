@@ -332,6 +332,9 @@ pub(crate) mod similarity {
     pub(crate) const CLASSES: usize = 20;
     /// Distance at which a Gaussian has half its height, in its deviations.
     pub(crate) const HALF_HEIGHT: f64 = 1.18;
+    /// Pairs of neighbours that what a turn leaves and what the next smaller one does are held
+    /// together by: those of two views.
+    pub(crate) const TURN_PAIRS: f64 = 2.0 * RANGE_LAGS as f64;
     /// Pairs of far views that are drawn.
     pub(crate) const FAR_PAIRS: usize = 40_000;
     /// Fewest views between two that are far from one another, and as a part of all.

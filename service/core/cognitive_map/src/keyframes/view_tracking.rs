@@ -1,6 +1,5 @@
 //! Where the views of a relaxed map are, for agents that are tracked among them.
 
-use nalgebra::Point3;
 use place_recognition::{SampleKey, Tracked, View, ViewMap};
 
 use super::graph::KeyframeGraph;
@@ -32,13 +31,10 @@ impl KeyframeGraph {
         if self.is_tied_by_sightings() {
             return Vec::new(); // nobody is tracked among them
         }
-        let position = |sample: SampleKey| {
-            let pose = self.chains.pose_of(&self.chains.at_sample(sample)?)?;
-            Some(Point3::from(pose.translation.vector))
-        };
+        let pose = |sample: SampleKey| self.chains.pose_of(&self.chains.at_sample(sample)?);
         let mut maps: Vec<ViewMap> = self.view_maps.iter().cloned().collect();
         for map in &mut maps {
-            map.locate(position);
+            map.locate(pose);
         }
         maps
     }

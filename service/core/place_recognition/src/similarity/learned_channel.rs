@@ -1,5 +1,6 @@
 //! What is known of a channel of views.
 
+use super::turned::Turned;
 use crate::tuning::log::VIEWS_MAX;
 use crate::tuning::similarity::COARSE_M;
 use state::state_of_struct;
@@ -13,6 +14,8 @@ pub struct LearnedChannel {
     pub views: u32,
     /// Range of the channel: views are alike within it \[m\].
     pub range_m: f64,
+    /// What a turn of the body between two views changes.
+    pub turned: Turned,
     /// Whether that is so far that a pair of views says less than odometry does. Agents are still
     /// found among the cells by such views.
     pub is_coarse: bool,
@@ -28,6 +31,7 @@ state_of_struct!(LearnedChannel {
     channel,
     views,
     range_m,
+    turned,
     is_coarse,
     information_nats,
     independence
@@ -46,6 +50,8 @@ impl LearnedChannel {
     /// Whether one that was read from a checkpoint is one.
     pub fn is_sound(&self) -> bool {
         let numbers = [self.range_m, self.information_nats, self.independence];
-        self.views as usize <= VIEWS_MAX && numbers.iter().all(|number| number.is_finite())
+        self.turned.is_sound()
+            && self.views as usize <= VIEWS_MAX
+            && numbers.iter().all(|number| number.is_finite())
     }
 }

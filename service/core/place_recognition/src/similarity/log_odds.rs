@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::neighbours::{NeighbourPair, Neighbours};
 use super::runs::Runs;
+use super::turned::Turned;
 use super::two_covariance::{TwoCovariance, single};
 use crate::tuning::similarity as tuning;
 
@@ -15,6 +16,8 @@ pub(super) struct Learned {
     pub(super) range_m: f64,
     /// Distance of views one after the other \[m\].
     pub(super) spacing_m: f64,
+    /// What a turn of the body changes in how alike views are.
+    pub(super) turned: Turned,
     /// Share of the evidence of a view that is its own: neighbours say nearly the same.
     pub(super) independence: f64,
     /// Log-odds of all pairs of views.
@@ -43,7 +46,8 @@ impl Learned {
         if far.len() < tuning::FAR_PAIRS / 100 {
             return None;
         }
-        let (range_m, spacing_m) = range_m(neighbours, &scores, &far)?;
+        let base = mean(&far, &scores);
+        let (range_m, spacing_m) = range_m(neighbours, base)?;
         let backgrounds = backgrounds(runs, &scores);
         let near = near_features(neighbours, range_m, &backgrounds);
         let distant = far_features(&far, &scores, &backgrounds);
@@ -51,6 +55,7 @@ impl Learned {
         let mut learned = Self {
             range_m,
             spacing_m,
+            turned: Turned::of(neighbours, range_m, base),
             independence: 1.0,
             log_odds: DMatrix::zeros(0, 0),
             weights,
@@ -168,13 +173,15 @@ fn floor(value: f64) -> usize {
     value as usize
 }
 
+/// Mean score of some pairs.
+fn mean(pairs: &[(usize, usize)], scores: &DMatrix<f32>) -> f64 {
+    let sum: f64 = pairs.iter().map(|&pair| f64::from(scores[pair])).sum();
+    sum / pairs.len() as f64
+}
+
 /// The range of a channel, from its views' neighbours along the way, and the distance of the
-/// nearest of them.
-fn range_m(
-    neighbours: &[NeighbourPair],
-    scores: &DMatrix<f32>,
-    far: &[(usize, usize)],
-) -> Option<(f64, f64)> {
+/// nearest of them; `base` is the mean score of far views.
+fn range_m(neighbours: &[NeighbourPair], base: f64) -> Option<(f64, f64)> {
     let mut pairs: Vec<(f64, f64)> = { neighbours.iter() }
         .map(|pair| (pair.distance_m, pair.score))
         .collect();
@@ -190,10 +197,6 @@ fn range_m(
         (distance / n, score / n)
     };
     let classes: Vec<(f64, f64)> = pairs.chunks(size).map(mean).collect();
-    let base = { far.iter() }
-        .map(|&pair| f64::from(scores[pair]))
-        .sum::<f64>()
-        / far.len() as f64;
     let half = base + 0.5 * (classes[0].1 - base);
     if half <= base {
         return None;

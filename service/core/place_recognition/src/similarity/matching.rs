@@ -8,6 +8,7 @@ use super::log_odds::{Learned, information_nats};
 use super::neighbours::Neighbours;
 use super::runs::{Runs, gap};
 use super::sequence_odds;
+use super::turned::Turned;
 use super::two_covariance::{TwoCovariance, single};
 use super::view_log::ViewLog;
 use crate::keyframes::SampleKey;
@@ -102,7 +103,7 @@ impl<'a> Similarity<'a> {
                 |some: &_, others: &_| model.scores_between(some, others) / single(score_sd);
             sequence_odds::of_thinned(&neighbours, &components, score, &learned)
         };
-        let known = (channel, learned.range_m);
+        let known = (channel, learned.range_m, learned.turned);
         Some(Self {
             share: runs.len() as f64 / all.len() as f64,
             view_map: view_map(known, &runs, &centres, &model, &matched),
@@ -110,6 +111,7 @@ impl<'a> Similarity<'a> {
                 channel,
                 views: u32::try_from(runs.len()).unwrap_or(u32::MAX),
                 range_m: learned.range_m,
+                turned: learned.turned,
                 is_coarse: learned.is_coarse(tuning::COARSE_M.0),
                 information_nats: information_nats(&runs, &neighbours, &views, learned.range_m),
                 independence: learned.independence,
@@ -268,7 +270,7 @@ impl<'a> Similarity<'a> {
 
 /// What later views are compared with; the views lie nowhere so far.
 fn view_map(
-    (channel, range_m): (u8, f64),
+    (channel, range_m, turned): (u8, f64, Turned),
     runs: &Runs<'_>,
     centres: &Centres,
     model: &TwoCovariance,
@@ -287,12 +289,13 @@ fn view_map(
         sample: view.sample,
         ordinal: view.ordinal,
         stretch: view.stretch,
-        position: None,
+        pose: None,
         components: singles(&mut components.iter()),
     });
     let model = ViewModel {
         channel,
         range_m,
+        turned,
         stride: runs.stride,
         centre: singles(&mut centres.whole.iter()),
         centres: own.collect(),

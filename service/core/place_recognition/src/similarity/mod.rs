@@ -8,12 +8,14 @@ mod matching;
 mod neighbours;
 mod runs;
 mod sequence_odds;
+mod turned;
 mod two_covariance;
 mod view_log;
 
 pub use learned_channel::LearnedChannel;
 pub use matching::{Similarity, ViewMatch};
 pub(crate) use runs::gap;
+pub use turned::Turned;
 pub(crate) use two_covariance::single;
 pub use view_log::ViewLog;
 pub(crate) use view_log::{LoggedView, logged};

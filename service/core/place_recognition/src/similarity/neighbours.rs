@@ -15,6 +15,8 @@ pub(super) struct NeighbourPair {
     pub(super) lag: usize,
     /// Distance between them by motion alone \[m\].
     pub(super) distance_m: f64,
+    /// Angle that the body has turned by between them, by motion alone \[rad\].
+    pub(super) turn_rad: f64,
     /// Their score.
     pub(super) score: f64,
 }
@@ -98,6 +100,7 @@ impl<'a> Neighbours<'a> {
                     about: (first, second.about),
                     lag: lag.unsigned_abs(),
                     distance_m: self.all.distance_m(place, second.place),
+                    turn_rad: self.all.turn_rad(place, second.place),
                     score: score / score_sd,
                 });
             }

@@ -112,6 +112,12 @@ impl<'a> Runs<'a> {
         let [a, b] = [a, b].map(|index| self.views[index].in_odom.translation.vector);
         (a - b).norm()
     }
+
+    /// Angle that the body has turned by between two views of a run, by motion alone \[rad\].
+    pub(super) fn turn_rad(&self, a: usize, b: usize) -> f64 {
+        let [a, b] = [a, b].map(|index| self.views[index].in_odom.rotation);
+        a.angle_to(&b)
+    }
 }
 
 /// Fewest views that lie between two of a run that may be matched, of so many in all.

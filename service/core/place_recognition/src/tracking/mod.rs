@@ -1,6 +1,7 @@
 //! Tracking among the views of a map: where an agent that knows about where it is goes on, by
 //! what it sees.
 
+mod expected;
 mod tracker;
 mod view_field;
 mod view_map;

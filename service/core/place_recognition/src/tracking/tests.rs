@@ -1,7 +1,7 @@
 //! A robot that walks about a room whose floor shows something else everywhere, and whose odometry
 //! turns by more than it says.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use geometry::PoseCovariance;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -10,7 +10,8 @@ use state::{State, StateReader, StateWriter};
 
 use super::*;
 use crate::keyframes::SampleKey;
-use crate::similarity::LoggedView;
+use crate::similarity::{LoggedView, Turned};
+use crate::tuning::tracking as tuning;
 use crate::view::View;
 
 const NUMBERS: usize = 24;
@@ -60,6 +61,7 @@ fn map_at(floor: &Floor, origin: &Vector3<f64>, draws: &mut Seeded) -> ViewMap {
     let model = ViewModel {
         channel: 0,
         range_m: RANGE_M,
+        turned: Turned::NOTHING,
         stride: 1,
         centre: vec![0.0; NUMBERS],
         centres: Vec::new(),
@@ -80,7 +82,7 @@ fn map_at(floor: &Floor, origin: &Vector3<f64>, draws: &mut Seeded) -> ViewMap {
             },
             ordinal: number,
             stretch: 0,
-            position: Some(at + origin),
+            pose: Some(Isometry3::from(at.coords + origin)),
             components: floor.seen(&at, draws),
         }
     };
@@ -356,4 +358,49 @@ fn a_map_far_from_its_origin_is_as_one_about_it() {
         sum / 100.0
     });
     assert!((off_m[0] - off_m[1]).abs() < 0.01, "{off_m:?}");
+}
+
+#[test]
+fn views_ahead_say_nothing_of_one_who_looks_behind() {
+    let mut draws = Seeded(7);
+    let floor = Floor::new(&mut draws);
+    let at = Point3::new(2.1, 1.9, 0.0);
+    let seen = floor.seen(&at, &mut draws);
+    let view = LoggedView {
+        channel: 0,
+        sample: SampleKey {
+            agent: 0,
+            session: 0,
+            seq: 0,
+        },
+        ordinal: 0,
+        stretch: 0,
+        in_odom: Isometry3::identity(),
+        vector: seen.clone().into(),
+    };
+    // All views of the map were taken with one heading.
+    let nats = |turned: Turned, turn_rad: f64, tilt_rad: f64| {
+        let mut map = map(&floor, &mut Seeded(8));
+        map.model.turned = turned;
+        let tilted = UnitQuaternion::from_euler_angles(tilt_rad, 0.0, 0.5);
+        let estimate = Isometry3::from_parts(at.into(), tilted);
+        let expected = expected::Expected::of(&seen, &view, &map, (&estimate, [at, at]));
+        expected.log_likelihood(&at, turn_rad - 0.5)
+    };
+    let camera = Turned::of_parts([1.0, 0.5, 0.0, 0.0, 0.0]);
+    let all_round = nats(Turned::NOTHING, PI, 0.0);
+    assert!(all_round > 2.0, "{all_round}");
+    let nothing = tuning::ELSE.ln();
+    for (turn_rad, tilt_rad) in [(PI, 0.0), (-PI / 2.0, 0.0), (0.0, PI / 2.0), (PI, PI / 2.0)] {
+        let behind = nats(camera, turn_rad, tilt_rad);
+        assert!((behind - nothing).abs() < 1e-9, "{behind}");
+    }
+    for turn_rad in [0.0, TAU, -TAU] {
+        let ahead = nats(camera, turn_rad, 0.0);
+        assert!(
+            (ahead - nats(Turned::NOTHING, 0.0, 0.0)).abs() < 1e-9,
+            "{ahead}"
+        );
+    }
+    assert!(nats(camera, 0.5, 0.0) < nats(camera, 0.0, 0.0));
 }

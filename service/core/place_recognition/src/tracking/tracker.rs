@@ -7,7 +7,8 @@ use nalgebra::{Isometry3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 use random::Seeded;
 use state::{Counted, state_of_struct};
 
-use super::view_map::{Similar, ViewMap};
+use super::expected::Expected;
+use super::view_map::ViewMap;
 use crate::keyframes::SampleKey;
 use crate::particle_numbers::{floats, pair};
 use crate::similarity::LoggedView;
@@ -216,22 +217,19 @@ impl Tracker {
     /// Weighs the particles by what is seen; answers how much more probable that is where they are
     /// than anywhere \[nats\].
     fn weigh(&mut self, components: &[f32], logged: &LoggedView, map: &ViewMap) -> f64 {
-        let width_m = tuning::WIDTH * map.model.range_m;
-        let reach = Vector3::repeat(tuning::KERNEL_REACH * width_m);
-        let [low, high] = self.bounds();
-        let mut similar = map.similar(components, logged, &[low - reach, high + reach]);
-        similar.sort_by(|a, b| a.position.x.total_cmp(&b.position.x));
-        let side_m = tuning::CELL * map.model.range_m;
-        let mut keys: Vec<([i32; 2], u32)> = (0..)
+        let expected = Expected::of(components, logged, map, (&self.pose, self.bounds()));
+        let (side_m, side_rad) = (expected.side_m(), expected.side_rad());
+        let mut keys: Vec<([i32; 3], u32)> = (0..)
             .zip(&self.particles)
-            .map(|(number, particle)| (key(particle, side_m), number))
+            .map(|(number, particle)| (key(particle, side_m, side_rad), number))
             .collect();
         keys.sort_unstable();
         let (mut gained, mut whole) = (0.0, 0.0);
         for cell in keys.chunk_by(|a, b| a.0 == b.0) {
-            let [x, y] = cell[0].0.map(|number| (f64::from(number) + 0.5) * side_m);
-            let at = Point3::from(self.pose.translation.vector + Vector3::new(x, y, 0.0));
-            let log_likelihood = log_likelihood(&at, &similar, width_m);
+            let [x, y, turn] = cell[0].0.map(|number| f64::from(number) + 0.5);
+            let off = Vector3::new(x * side_m, y * side_m, 0.0);
+            let at = Point3::from(self.pose.translation.vector + off);
+            let log_likelihood = expected.log_likelihood(&at, turn * side_rad.unwrap_or(0.0));
             let factor = (tuning::PART * log_likelihood).exp();
             for (_, number) in cell {
                 let particle = &mut self.particles[*number as usize];
@@ -408,38 +406,11 @@ fn drawn(view: &View<'_>, count: usize, draws: &mut Seeded) -> Vec<Particle> {
     drawn.collect()
 }
 
-/// How much more probable a view is at a position than anywhere \[nats\]: as at the views about it.
-/// Where there are none, it is as improbable as one that shows something else: that the agent has
-/// left the map is said by views that fit nowhere in it, and not by those that fit elsewhere.
-///
-/// `similar` is sorted by x.
-///
-/// ```text
-/// l(x) = (½ ln ε + Σ w lⱼ) / (½ + Σ w),  w = exp(−|x − xⱼ|² / 2h²)
-/// ```
-fn log_likelihood(at: &Point3<f64>, similar: &[Similar], width_m: f64) -> f64 {
-    let reach_m = tuning::KERNEL_REACH * width_m;
-    let scale = -0.5 / (width_m * width_m);
-    let mut weights = tuning::UNKNOWN;
-    let mut sum = tuning::UNKNOWN * tuning::ELSE.ln();
-    let first = similar.partition_point(|other| other.position.x < at.x - reach_m);
-    for other in &similar[first..] {
-        if other.position.x > at.x + reach_m {
-            break;
-        }
-        let squared = (other.position - at).norm_squared();
-        if squared < reach_m * reach_m {
-            let weight = (scale * squared).exp();
-            weights += weight;
-            sum += weight * other.log_likelihood;
-        }
-    }
-    sum / weights
-}
-
 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-fn key(particle: &Particle, side_m: f64) -> [i32; 2] {
-    particle.off.map(|x| (f64::from(x) / side_m).floor() as i32)
+fn key(particle: &Particle, side_m: f64, side_rad: Option<f64>) -> [i32; 3] {
+    let [x, y] = particle.off.map(|x| f64::from(x) / side_m);
+    let turn = side_rad.map_or(0.0, |side_rad| f64::from(particle.turn_rad) / side_rad);
+    [x, y, turn].map(|number| number.floor() as i32)
 }
 
 /// A covariance of an error in axes of the map, on the right of a pose.

@@ -1,9 +1,9 @@
-//! What views show as a function of where they are seen.
+//! What views show as a function of where they are seen, and of which way an agent looks.
 
-use nalgebra::Point3;
+use nalgebra::Isometry3;
 
 use crate::descriptor::dot;
-use crate::similarity::single;
+use crate::similarity::{Turned, single};
 use crate::tuning::tracking as tuning;
 
 /// Means of the views about each of a channel's views, and how probable other views are there.
@@ -16,7 +16,8 @@ use crate::tuning::tracking as tuning;
 /// Λ(z) = Σ [ ln N(z; μ, s²) − ln N(z; 0, 1) ]
 /// ```
 ///
-/// Of n views w of each counts, by its distance: w = exp(−d² / 2h²).
+/// Of n views w of each counts, by its distance, and by the part g that a turn of the body leaves:
+/// w = g exp(−d² / 2h²).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ViewField {
     /// ½ (1/s² − 1) of each component, for each class of n.
@@ -48,21 +49,23 @@ impl About {
         }
     }
 
-    /// The views about a position: of each, its position and its components.
+    /// The views about a pose, within a width \[m\]: of each, its pose and its components.
     pub(super) fn of<'a>(
-        at: &Point3<f64>,
-        width_m: f64,
+        at: &Isometry3<f64>,
+        (width_m, turned): (f64, &Turned),
         length: usize,
-        views: impl Iterator<Item = (&'a Point3<f64>, &'a [f32])>,
+        views: impl Iterator<Item = (&'a Isometry3<f64>, &'a [f32])>,
     ) -> Self {
         let mut about = Self::nothing(length);
         let reach = tuning::KERNEL_REACH * width_m;
         for (there, components) in views {
-            let squared = (there - at).norm_squared();
+            let off = there.translation.vector - at.translation.vector;
+            let squared = off.norm_squared();
             if squared > reach * reach {
                 continue;
             }
-            let weight = (-0.5 * squared / (width_m * width_m)).exp();
+            let turned = turned.part(there.rotation.angle_to(&at.rotation));
+            let weight = (-0.5 * squared / (width_m * width_m)).exp() * turned;
             about.n += weight;
             let weight = single(weight);
             for (sum, component) in about.sum.iter_mut().zip(components) {

@@ -1,11 +1,11 @@
 //! The views of a channel where a relaxed map has them, to compare later views with.
 
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 
 use super::view_field::{About, ViewField};
 use crate::descriptor::dot;
 use crate::keyframes::SampleKey;
-use crate::similarity::{LoggedView, gap};
+use crate::similarity::{LoggedView, Turned, gap};
 use crate::tuning::{log, tracking as tuning};
 use geometry::is_somewhere;
 use state::{CorruptState, Counted, State, StateReader, StateWriter, state_of_struct};
@@ -29,6 +29,8 @@ pub(crate) struct ViewModel {
     pub(crate) channel: u8,
     /// Views are alike within it \[m\].
     pub(crate) range_m: f64,
+    /// What a turn of the body changes.
+    pub(crate) turned: Turned,
     /// Difference of the ordinals of neighbours.
     pub(crate) stride: u32,
     /// About what views are taken: those of most sessions, and those of long ones.
@@ -54,16 +56,16 @@ pub(crate) struct ReferenceView {
     pub(crate) sample: SampleKey,
     pub(crate) ordinal: u32,
     pub(crate) stretch: u32,
-    /// Where the map has it \[m\]; `None` if it lies in no map.
-    pub(crate) position: Option<Point3<f64>>,
+    /// Pose of the body where the map has it; `None` if it lies in no map.
+    pub(crate) pose: Option<Isometry3<f64>>,
     pub(crate) components: Vec<f32>,
 }
 
 /// A view that lies in the map, beside another one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Similar {
-    /// Where it was seen \[m\].
-    pub(crate) position: Point3<f64>,
+    /// Pose of the body that saw it, in the map.
+    pub(crate) pose: Isometry3<f64>,
     /// Log of how much more probable the other one is there than anywhere \[nats\].
     pub(crate) log_likelihood: f64,
 }
@@ -78,13 +80,14 @@ state_of_struct!(ReferenceView {
     sample,
     ordinal,
     stretch,
-    position,
+    pose,
     components as Counted<u16>,
 });
 
 state_of_struct!(ViewModel {
     channel,
     range_m,
+    turned,
     stride,
     centre as Counted<u16>,
     centres,
@@ -121,10 +124,10 @@ impl ViewMap {
     }
 
     /// Puts its views where a map has them.
-    pub fn locate(&mut self, position: impl Fn(SampleKey) -> Option<Point3<f64>>) {
+    pub fn locate(&mut self, pose: impl Fn(SampleKey) -> Option<Isometry3<f64>>) {
         for reference in &mut self.references {
-            let there = position(reference.sample);
-            reference.position = there.filter(|there| is_somewhere(&there.coords));
+            let there = pose(reference.sample);
+            reference.pose = there.filter(|there| is_somewhere(&there.translation.vector));
         }
         self.fill_field();
     }
@@ -152,10 +155,11 @@ impl ViewMap {
     ) -> Vec<Similar> {
         let seen = self.field.at(components);
         let similar = { self.references.iter().enumerate() }.filter_map(|(number, other)| {
-            let position = other.position?;
+            let pose = other.pose?;
+            let position = Point3::from(pose.translation.vector);
             let is_within = low <= &position && &position <= high;
             (is_within && self.is_apart(other, view)).then(|| Similar {
-                position,
+                pose,
                 log_likelihood: seen.log_likelihood(number, components),
             })
         });
@@ -173,12 +177,12 @@ impl ViewMap {
     fn fill_field(&mut self) {
         let correlations = &self.model.correlations;
         let mut field = ViewField::new(correlations);
-        let width_m = tuning::WIDTH * self.model.range_m;
+        let width = (tuning::WIDTH * self.model.range_m, &self.model.turned);
         for reference in &self.references {
             let others = { self.references.iter() }
-                .filter_map(|other| Some((other.position.as_ref()?, other.components.as_slice())));
-            let about = match &reference.position {
-                Some(at) => About::of(at, width_m, correlations.len(), others),
+                .filter_map(|other| Some((other.pose.as_ref()?, other.components.as_slice())));
+            let about = match &reference.pose {
+                Some(at) => About::of(at, width, correlations.len(), others),
                 None => About::nothing(correlations.len()),
             };
             field.push(&about, correlations);
@@ -191,8 +195,11 @@ impl ViewMap {
     pub(crate) fn is_sound(&self, length: Option<usize>) -> bool {
         let n = self.model.correlations.len();
         let is_reference = |one: &ReferenceView| {
-            let is_there = |at: &Point3<f64>| is_somewhere(&at.coords);
-            one.position.as_ref().is_none_or(is_there) && is_whole(&one.components, n)
+            let is_there = |at: &Isometry3<f64>| {
+                is_somewhere(&at.translation.vector)
+                    && at.rotation.coords.iter().all(|x| x.is_finite())
+            };
+            one.pose.as_ref().is_none_or(is_there) && is_whole(&one.components, n)
         };
         length.is_some_and(|length| self.model.is_sound(length))
             && self.references.len() <= log::VIEWS_MAX
@@ -235,6 +242,7 @@ impl ViewModel {
         self.stride > 0
             && self.range_m.is_finite()
             && self.range_m > 0.0
+            && self.turned.is_sound()
             && is_whole(&self.centre, length)
             && { self.centres.iter() }.all(|one| is_whole(&one.mean, length))
             && is_whole(&self.projection, self.correlations.len() * length)

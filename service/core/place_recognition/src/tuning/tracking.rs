@@ -9,6 +9,10 @@ pub(crate) const WIDTH: f64 = 0.5;
 pub(crate) const KERNEL_REACH: f64 = 3.0;
 /// Side of the cells in which a view is as probable everywhere.
 pub(crate) const CELL: f64 = 0.25;
+/// Turns of the body in which it is as probable everywhere: as many to a full one.
+pub(crate) const CELLS_TURNED: f64 = 24.0;
+/// Part that a turn leaves at least where it changes nothing.
+pub(crate) const UNTURNED: f64 = 0.95;
 /// Classes of how many views are about a position: up to 2⁸.
 pub(crate) const CLASS_MAX: usize = 16;
 /// ε: probability that a view shows something else.
