@@ -47,7 +47,7 @@ pub use answer::{
     RecalledPlace, Rivals, SpaceInfo, SpaceList, StampedPose, Trajectory, Trip, TripDetail,
     TripPage,
 };
-pub use channel::{Channel, ChannelKind, ChannelList, LearnedChannel};
+pub use channel::{Channel, ChannelKind, ChannelList, Compass, LearnedChannel};
 pub use codec::Codec;
 pub use encoding::{CBOR, JSON, POSTCARD_V1};
 pub use error::DecodeError;

@@ -295,5 +295,18 @@ export interface Channel {
   name: string;
   kind: "level" | "descriptor";
   views: number | null;
-  learned: { range_m: number; information_nats: number; independence: number } | null;
+  learned: {
+    range_m: number;
+    information_nats: number;
+    independence: number;
+    turned: number[];
+    coarse: boolean;
+  } | null;
+  compass: {
+    rad_per_unit: number;
+    offset_rad: number;
+    lasting_sd_rad: number;
+    noise_sd_rad: number;
+    agent: string | null;
+  } | null;
 }

@@ -1,7 +1,7 @@
 //! Answers of the HTTP interface, and the settings of a space.
 
 use cogmap_proto::{
-    AgentDetail, AgentPage, AgentSummary, Channel, ChannelKind, ChannelList, Evidence,
+    AgentDetail, AgentPage, AgentSummary, Channel, ChannelKind, ChannelList, Compass, Evidence,
     ExpectedPercept, GridModuleState, GridState, IngestAnswer, Landmark, LandmarkPage,
     LearnedChannel, Leg, NoiseSettings, Place, PlacePage, PlacePercepts, PredictAnswer,
     PredictedPercept, Problem, RecallAnswer, RecalledPlace, Recruitment, RememberedPercept, Rivals,
@@ -393,6 +393,8 @@ fn channels() -> ChannelList {
         range_m: 2.5,
         information_nats: 3.25,
         independence: 0.5,
+        turned: [1.0, 0.75, 0.5, 0.25, 0.125],
+        coarse: true,
     };
     let view = Channel {
         name: "laser".to_owned(),
@@ -400,6 +402,7 @@ fn channels() -> ChannelList {
         dimension: Some(60),
         views: Some(700),
         learned: Some(learned),
+        compass: None,
     };
     let level = Channel {
         name: "lumière".to_owned(),
@@ -407,9 +410,21 @@ fn channels() -> ChannelList {
         dimension: None,
         views: None,
         learned: None,
+        compass: None,
+    };
+    let compass = Channel {
+        name: "compass".to_owned(),
+        compass: Some(Compass {
+            rad_per_unit: -0.017_453_292_519_943_295,
+            offset_rad: 1.5,
+            lasting_sd_rad: 0.25,
+            noise_sd_rad: 0.125,
+            agent: Some("r1".to_owned()),
+        }),
+        ..level.clone()
     };
     ChannelList {
-        channels: vec![view, level],
+        channels: vec![view, level, compass],
     }
 }
 

@@ -3,9 +3,9 @@
 use std::f32::consts::FRAC_PI_2;
 
 use cogmap_proto::{
-    Codec, Descriptor, Event, EventKind, ExpectedPercept, Increment, Level, MotionBody, PerceptCue,
-    PerceptKind, PredictAnswer, PredictQuery, Problem, RecallQuery, Sample, SampleBody, StartPose,
-    events_key, query_key,
+    Codec, Descriptor, Event, EventKind, ExpectedPercept, Increment, Level, MotionBody,
+    MotionNoise, PerceptCue, PerceptKind, PredictAnswer, PredictQuery, Problem, RecallQuery,
+    Sample, SampleBody, StartPose, events_key, query_key,
 };
 use cogmap_tests::{LONG, RawPublisher, Server, batch};
 use zenoh::Wait;
@@ -189,6 +189,65 @@ fn a_motion_predicts_what_was_felt_at_its_end() {
     let problem = raw.ask(&key, Codec::Json.encoding(), Codec::Json.encode(&query));
     let problem: Problem = Codec::Json.decode(&problem.unwrap_err()).unwrap();
     assert_eq!(problem.status, 404);
+}
+
+/// A robot that starts at a heading and goes straight on, with a compass in degrees, clockwise from
+/// where the map's y axis points.
+fn straight_on(heading_rad: f64) -> Vec<Sample> {
+    let (sin, cos) = (heading_rad / 2.0).sin_cos();
+    let mut bodies = vec![SampleBody::StartPose(StartPose {
+        translation_m: [0.0; 3],
+        rotation_xyzw: [0.0, 0.0, sin, cos],
+        noise: None,
+    })];
+    for _ in 0..60 {
+        bodies.push(SampleBody::Increment(Increment {
+            noise: Some(MotionNoise {
+                translation_sd_m: [0.01, 0.01, 0.0],
+                rotation_sd_rad: [0.0, 0.0, 1e-3],
+            }),
+            ..increment(0.25)
+        }));
+        bodies.push(SampleBody::Level(Level {
+            channel: "compass".to_owned(),
+            value: (90.0 - heading_rad.to_degrees()).rem_euclid(360.0),
+            offset_m: [0.0; 3],
+            normal: None,
+        }));
+    }
+    let stamped = (1_800_000_000_000_000_000_i64..)
+        .step_by(10_000_000)
+        .zip(bodies);
+    stamped
+        .map(|(stamp_ns, body)| Sample { stamp_ns, body })
+        .collect()
+}
+
+#[test]
+fn levels_that_tell_a_heading_are_listed_as_a_compass() {
+    let server = Server::start(&[]);
+    let api = server.api();
+    let way = batch(1, 0, along_the_wall());
+    api.post_samples("default", AGENT, &way).unwrap();
+    for number in 0_u32..20 {
+        let way = batch(1, 0, straight_on(2.4 * f64::from(number)));
+        let name = format!("robot-{number}");
+        api.post_samples("default", &name, &way).unwrap();
+    }
+    let channels = api.channels("default").unwrap();
+    let compass = |name: &str| {
+        let mut named = channels.iter().filter(|channel| channel.name == name);
+        named.next().expect("a channel").compass.clone()
+    };
+    assert_eq!((compass("roughness"), compass("camera")), (None, None));
+    let compass = compass("compass").expect("levels that tell a heading");
+    let is_clockwise = (compass.rad_per_unit + 1.0_f64.to_radians()).abs() < 1e-12;
+    assert!(is_clockwise, "{compass:?}");
+    assert_eq!(compass.agent, None);
+    // A level of 90° is a heading of zero, and six degrees are the least that lasts of an error.
+    let heading_rad = compass.rad_per_unit * 90.0 - compass.offset_rad;
+    assert!(heading_rad.sin().abs() < 0.01 && heading_rad.cos() > 0.0);
+    assert!((0.1..0.2).contains(&compass.lasting_sd_rad), "{compass:?}");
 }
 
 #[test]

@@ -1,9 +1,10 @@
-/** What the service has learned of the channels of views: how far they reach, and what they say. */
+/** What the service has learned of channels: how far views reach and what they say, and which
+ *  levels are a compass. */
 
 import type { Memory } from "../memory/memory";
 import type { Channel } from "../wire";
 import { h } from "./dom";
-import { metres } from "./format";
+import { degrees, metres, percent } from "./format";
 
 /** Channels that are shown: those that were sensed first. */
 const CHANNELS_MAX = 12;
@@ -15,8 +16,9 @@ export class ChannelList {
   private drawn = "";
 
   update(memory: Memory): void {
-    const views = memory.channels.filter(({ kind }) => kind === "descriptor");
-    const shown = views.slice(0, CHANNELS_MAX);
+    const shown = memory.channels
+      .filter(({ kind, compass }) => kind === "descriptor" || compass !== null)
+      .slice(0, CHANNELS_MAX);
     const drawn = JSON.stringify(shown);
     if (drawn === this.drawn) {
       return;
@@ -27,7 +29,25 @@ export class ChannelList {
   }
 }
 
-function row({ name, views, learned }: Channel): HTMLElement {
+function row(channel: Channel): HTMLElement {
+  return channel.compass === null ? viewRow(channel) : compassRow(channel.name, channel.compass);
+}
+
+function compassRow(name: string, compass: NonNullable<Channel["compass"]>): HTMLElement {
+  const lasting = degrees(compass.lasting_sd_rad);
+  const title =
+    `a compass: its levels tell the heading to ${lasting} that lasts, ` +
+    `and ${degrees(compass.noise_sd_rad)} of noise`;
+  return h(
+    "li",
+    { title, attributes: { "data-channel": name } },
+    h("span", { class: "what" }, name),
+    h("span", { class: "soft" }, "compass"),
+    h("span", { class: "soft number" }, `± ${lasting}`),
+  );
+}
+
+function viewRow({ name, views, learned }: Channel): HTMLElement {
   const bar = h("i");
   const nats = Math.max(0, learned?.information_nats ?? 0);
   bar.style.width = `${Math.min(100, (100 * nats) / NATS_MAX)}%`;
@@ -35,7 +55,9 @@ function row({ name, views, learned }: Channel): HTMLElement {
     learned === null
       ? `${views ?? 0} views; nothing is learned of them yet`
       : `${views ?? 0} views, alike within ${metres(learned.range_m)}; ` +
-        `each says ${nats.toFixed(1)} nats of where it was seen`;
+        `each says ${nats.toFixed(1)} nats of where it was seen` +
+        `; half a turn leaves ${percent(learned.turned[4] ?? 1)} of it` +
+        (learned.coarse ? "; too far to close loops by" : "");
   const range = learned === null ? "learning" : metres(learned.range_m);
   return h(
     "li",

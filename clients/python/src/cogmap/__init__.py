@@ -36,7 +36,7 @@ from .answer import (
     TripPage,
     Watermark,
 )
-from .channel import Channel, ChannelKind, ChannelList, LearnedChannel
+from .channel import Channel, ChannelKind, ChannelList, Compass, LearnedChannel
 from .client import Client
 from .credentials import Credentials
 from .errors import (
@@ -231,6 +231,7 @@ __all__ = [
     "Closed",
     "CloudPlace",
     "CogmapError",
+    "Compass",
     "Contact",
     "ContactDescriptor",
     "ContactLevel",

@@ -40,6 +40,7 @@ pub use memory::sequence::{
 };
 pub use memory::trip::{Leg, Trip, TripEnd, TripId};
 pub use memory::way::{Traversals, Way, Waypoint};
+pub use place_filter::{HeadingModel, LearnedCompass};
 pub use route::{
     Back, Following, NoRoute, NoRouteEnd, Region, Reverse, Route, RouteBounds, RouteCost, RouteEnd,
     RouteOptions, RouteStep, StepKind, ThinnedTraversal, ThinnedWay,

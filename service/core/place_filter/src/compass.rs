@@ -53,6 +53,15 @@ impl Default for Compass {
     }
 }
 
+/// What has been learned of a compass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LearnedCompass {
+    /// How levels tell a heading.
+    pub model: HeadingModel,
+    /// The agent that alone has taught it, and that alone it is true of.
+    pub agent: Option<u32>,
+}
+
 /// Levels of a channel along a stretch of an agent's way, beside its heading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stretch {
@@ -124,6 +133,21 @@ impl HeadingModel {
         angle_rad(self.factor, level) - self.offset_rad
     }
 
+    /// Angle for each unit of the level \[rad\]: below zero where levels grow to the right.
+    pub fn rad_per_unit(&self) -> f64 {
+        self.factor
+    }
+
+    /// The level as an angle at a heading of zero \[rad\].
+    pub fn offset_rad(&self) -> f64 {
+        self.offset_rad
+    }
+
+    /// Variance of the noise about the part of its error that lasts \[rad²\].
+    pub fn noise_rad2(&self) -> f64 {
+        self.noise_rad2
+    }
+
     /// Variance of the part of its error that lasts \[rad²\].
     pub fn lasting_rad2(&self) -> f64 {
         self.lasting_rad2
@@ -141,6 +165,14 @@ impl Compass {
     pub fn tells(&self, agent: u32) -> Option<&HeadingModel> {
         let is_for = self.has_others || self.first == agent;
         self.tells.as_ref().filter(|_| is_for)
+    }
+
+    /// What has been learned; `None` while levels are not known to tell a heading.
+    pub fn learned(&self) -> Option<LearnedCompass> {
+        self.tells.map(|model| LearnedCompass {
+            model,
+            agent: (!self.has_others).then_some(self.first),
+        })
     }
 
     /// Learns from a stretch of an agent that knows its heading.

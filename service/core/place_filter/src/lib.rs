@@ -13,7 +13,7 @@ mod tuning;
 mod variogram;
 mod window;
 
-pub use compass::{Compass, HeadingModel, Stretch};
+pub use compass::{Compass, HeadingModel, LearnedCompass, Stretch};
 pub use field::Field;
 pub use filter::{PlaceFilter, SensedLevel};
 pub use follow::{Measured, Measurement};

@@ -113,6 +113,42 @@ fn a_robot_is_held_by_its_compass() {
 }
 
 #[test]
+fn what_a_compass_tells_is_known() {
+    let compass = |map: &CognitiveMap| map.channels().find_map(|(_, one)| one.compass());
+    let learned = compass(&taught(degrees)).expect("a compass");
+    assert_eq!(learned.agent, None);
+    let model = &learned.model;
+    assert!(
+        (model.rad_per_unit() + PI / 180.0).abs() < 1e-12,
+        "{learned:?}"
+    );
+    let off_rad = model.heading_rad(73.0 - 1.0_f64.to_degrees()) - 1.0;
+    assert!(
+        ((off_rad + PI).rem_euclid(TAU) - PI).abs() < 0.1,
+        "{learned:?}"
+    );
+    for variance_rad2 in [model.lasting_rad2(), model.noise_rad2()] {
+        let sd_rad = variance_rad2.sqrt();
+        assert!((0.07..0.15).contains(&sd_rad), "{learned:?}");
+    }
+    let field: Level = |_, _, random| Some(40.0 + 5.0 * random.normal());
+    assert_eq!(compass(&taught(field)), None);
+
+    // What one robot has taught is true of that one.
+    let mut map = CognitiveMap::new(Settings::default());
+    let mut walker = Walker::untold(&mut map, 0.0, 1);
+    for session in 1..=40_u32 {
+        (walker.robot.session, walker.robot.seq) = (session.into(), 0);
+        walker.heading_rad = 2.4 * f64::from(session);
+        let start = start_pose([0.0; 3], [0.0, 0.0, walker.heading_rad]);
+        walker.robot.sample(&mut map, start);
+        walker.roam(&mut map, 60, 1e-3, degrees);
+    }
+    let alone = compass(&map).expect("a compass");
+    assert_eq!(alone.agent, Some(walker.robot.id.0));
+}
+
+#[test]
 fn levels_that_tell_no_heading_change_none() {
     let without = off_rad(&taught(|_, _, _| None), |_, _, _| None);
     let constant: Level = |_, _, _| Some(1e20);

@@ -1,7 +1,7 @@
 //! Channels: what percepts are sensed on.
 
 use crate::input::Label;
-use place_filter::{Compass, Kernel, Variogram};
+use place_filter::{Compass, Kernel, LearnedCompass, Variogram};
 use state::{CorruptState, Moments, State, StateReader, StateWriter, state_of_struct};
 
 /// Least deviation that a level is compared with, as a part of the deviation of its channel's
@@ -98,6 +98,11 @@ impl Channel {
     /// What it carries.
     pub fn kind(&self) -> ChannelKind {
         self.kind
+    }
+
+    /// How its levels tell a heading; `None` while they are not known to, and for descriptors.
+    pub fn compass(&self) -> Option<LearnedCompass> {
+        self.compass.learned()
     }
 
     /// Least deviation that a level is compared with, in the channel's unit: a tenth of the
