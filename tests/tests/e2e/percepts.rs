@@ -53,6 +53,15 @@ fn increment(x_m: f64) -> Increment {
     }
 }
 
+/// A hundredth of a second apart.
+fn stamped(bodies: Vec<SampleBody>) -> Vec<Sample> {
+    let stamps = (1_800_000_000_000_000_000_i64..).step_by(10_000_000);
+    stamps
+        .zip(bodies)
+        .map(|(stamp_ns, body)| Sample { stamp_ns, body })
+        .collect()
+}
+
 /// Along the wall, whose roughness is the way from its beginning, and back again.
 fn along_the_wall() -> Vec<Sample> {
     let mut bodies = vec![SampleBody::StartPose(StartPose {
@@ -69,12 +78,7 @@ fn along_the_wall() -> Vec<Sample> {
             bodies.push(SampleBody::Descriptor(view(x_m)));
         }
     }
-    let stamped = (1_800_000_000_000_000_000_i64..)
-        .step_by(10_000_000)
-        .zip(bodies);
-    stamped
-        .map(|(stamp_ns, body)| Sample { stamp_ns, body })
-        .collect()
+    stamped(bodies)
 }
 
 fn recall(percept: PerceptCue) -> RecallQuery {
@@ -215,12 +219,7 @@ fn straight_on(heading_rad: f64) -> Vec<Sample> {
             normal: None,
         }));
     }
-    let stamped = (1_800_000_000_000_000_000_i64..)
-        .step_by(10_000_000)
-        .zip(bodies);
-    stamped
-        .map(|(stamp_ns, body)| Sample { stamp_ns, body })
-        .collect()
+    stamped(bodies)
 }
 
 #[test]
