@@ -11,6 +11,7 @@ use super::odometry_noise::OdometryNoise;
 use super::odometry_reading::OdometryReading;
 use super::outcome::Step;
 use super::parameters::Parameters;
+use super::standing::Standing;
 use super::tuning::{POSITION_SD_MAX_M, ROUNDING, RUN_LENGTH_MAX_M, RUN_STEPS_MAX};
 use crate::input::{Label, Motion, Relation};
 use geometry::{MotionSum, PoseCovariance, is_somewhere, positive, se3, symmetric};
@@ -47,6 +48,8 @@ pub(super) struct AgentFilter {
     pub(super) is_planar: bool,
     /// What its odometry turns out to be worth.
     pub(super) noise: OdometryNoise,
+    /// What its odometry reads while it seems to stand.
+    pub(super) standing: Standing,
 }
 
 /// Motion that is not in the covariance yet, about the axes of the pose where it began.
@@ -82,6 +85,7 @@ impl AgentFilter {
             history: OdometryHistory::default(),
             is_planar: true,
             noise: OdometryNoise::default(),
+            standing: Standing::default(),
         };
         filter
             .at_run_start
@@ -173,6 +177,7 @@ impl AgentFilter {
     ) -> Step {
         let reading = OdometryReading::new(motion, duration_s);
         self.is_planar &= reading.is_planar();
+        let measured_bias = self.standing.take_in(&reading, parameters.bias_sd_rad_s);
         let increment = reading.corrected_by(&self.calibration);
         let variance = self.learned_variance(motion, &increment, parameters);
         self.run.append(&reading, &increment, &variance);
@@ -197,6 +202,7 @@ impl AgentFilter {
                 moving_s: reading.moving_s(),
                 turned_rad: reading.scaled_angles(),
             },
+            measured_bias,
         }
     }
 

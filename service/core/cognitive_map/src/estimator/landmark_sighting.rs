@@ -33,7 +33,9 @@ impl Estimator {
         if is_aside {
             frame.forget(label);
         }
-        frame.begin_veer(observer, &self.parameters);
+        if !matches!(relation, Relation::Range(_)) {
+            frame.begin_veer(observer, &self.parameters);
+        }
         let state = frame.members[observer].state_mut();
         if !state.is_doubted() && !matches!(relation, Relation::Range(_)) {
             state.filter.learn_noise(called, stamp_ns, relation);

@@ -77,6 +77,7 @@ mod sensor;
 mod set_aside;
 mod sighting_pair;
 mod sightings;
+mod standing;
 mod state;
 mod tuning;
 mod verdict;

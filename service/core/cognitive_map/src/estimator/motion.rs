@@ -43,7 +43,11 @@ impl Estimator {
         ranging.go(&step.increment, &step.variance);
         filter.history.advance(stamp_ns, motion.increment());
         effects.push(Effect::Moved { agent, step });
-        if filter.is_nowhere() {
+        let is_nowhere = filter.is_nowhere();
+        if let Some(measured) = &step.measured_bias {
+            self.learn_bias(agent, measured, effects);
+        }
+        if is_nowhere {
             self.set_aside(agent, effects);
         }
         if !self.pending.is_empty() {

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Vector3, Vector6};
 
 use super::calibration::Calibrated;
+use super::standing::MeasuredBias;
 
 /// What became of an agent's sightings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,6 +33,8 @@ pub struct Step {
     pub variance: Vector6<f64>,
     /// How the increment was corrected.
     pub calibrated: Calibrated,
+    /// What the odometry read of its bias while the body stood before.
+    pub(super) measured_bias: Option<MeasuredBias>,
 }
 
 impl Step {
@@ -42,6 +45,7 @@ impl Step {
             increment: Isometry3::identity(),
             variance: Vector6::zeros(),
             calibrated: Calibrated::default(),
+            measured_bias: None,
         }
     }
 }

@@ -14,8 +14,9 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 use super::tuning::{
     DIRECTION_DISTANCE_MIN_M, RANGE_CURVED_MAX, RANGE_DOF, RANGE_HEIGHT_MAX_M,
     RANGE_JOIN_ANGLE_RAD, RANGE_JOIN_MASS, RANGE_JOIN_SAG, RANGE_LAYER_RAD, RANGE_LAYERS,
-    RANGE_OUTLYING_SQUARE, RANGE_OVERLAP, RANGE_REFLECTED, RANGE_REFLECTION_MAX_M,
-    RANGE_RING_POINTS, RANGE_SPHERE_POINTS, RANGE_TRIAL_MIN, RANGE_WEIGHT_MIN,
+    RANGE_OUTLYING_SQUARE, RANGE_OVERLAP, RANGE_POINTS_MAX, RANGE_REFLECTED,
+    RANGE_REFLECTION_MAX_M, RANGE_RING_POINTS, RANGE_SPHERE_POINTS, RANGE_TRIAL_MIN,
+    RANGE_WEIGHT_MIN,
 };
 use crate::input::Range;
 use geometry::{MotionSum, seen_by_pose, symmetric};
@@ -41,6 +42,8 @@ pub(super) struct RangeHypotheses {
     /// Distances that were taken in after the first, and how many of them fit none of the places.
     pub(super) taken: u32,
     pub(super) outlying: u32,
+    /// Log of the density of these, by all places together.
+    pub(super) log_evidence: f64,
 }
 
 /// Where a landmark is, in the body frame.
@@ -102,31 +105,28 @@ pub(super) fn loss_of_weight(square: f64) -> f64 {
 impl RangeHypotheses {
     /// Of a first distance, with its variance \[m²\].
     pub(super) fn new(range: &Range, variance: f64, is_planar: bool) -> Self {
-        let points = if is_planar {
-            rings(range, variance)
-        } else {
-            sphere(range, variance)
-        };
         Self {
-            points,
+            points: places(range, variance, is_planar),
             motion: MotionSum::default(),
             path_m: 0.0,
             used: 0,
             taken: 0,
             outlying: 0,
+            log_evidence: 0.0,
         }
     }
 
     /// A further distance, with its variance \[m²\]. If most of them fit none of the places, the
-    /// first one was wrong: then they begin anew with this one.
+    /// beacon is elsewhere by now: then they begin anew with this one.
     pub(super) fn update(&mut self, range: &Range, variance: f64, is_planar: bool) {
         self.carry_over_motion();
         let mut least = f64::INFINITY;
         for point in &mut self.points {
             least = least.min(point.update(range, variance));
         }
-        self.prune();
+        self.log_evidence += self.prune();
         self.taken += 1;
+        self.suppose_reflections(range, variance, is_planar);
         self.outlying += u32::from(least > RANGE_OUTLYING_SQUARE);
         if self.taken >= RANGE_TRIAL_MIN && 2 * self.outlying > self.taken || self.points.is_empty()
         {
@@ -134,6 +134,30 @@ impl RangeHypotheses {
             *self = Self::new(range, variance, is_planar);
             self.used = used;
         }
+    }
+
+    /// All distances before this one may have been those of reflections: adds the places where the
+    /// landmark may be by this one alone, as far as that is probable beside the others.
+    fn suppose_reflections(&mut self, range: &Range, variance: f64, is_planar: bool) {
+        let mut added = places(range, variance, is_planar);
+        let log_density = (RANGE_REFLECTED / RANGE_REFLECTION_MAX_M).ln();
+        let log_weight =
+            f64::from(self.taken) * log_density - self.log_evidence - (added.len() as f64).ln();
+        if log_weight <= RANGE_WEIGHT_MIN.ln() {
+            return;
+        }
+        for point in &mut added {
+            point.log_weight = log_weight;
+        }
+        self.points.append(&mut added);
+        if self.points.len() > RANGE_POINTS_MAX {
+            let more = |one: &PointHypothesis, other: &PointHypothesis| {
+                other.log_weight.total_cmp(&one.log_weight)
+            };
+            self.points.sort_by(more);
+            self.points.truncate(RANGE_POINTS_MAX);
+        }
+        self.log_evidence += self.normalise();
     }
 
     /// Moves the places to the body frame as it is now.
@@ -152,15 +176,17 @@ impl RangeHypotheses {
     }
 
     /// Drops the places that next to nothing speaks for; the weights of the others sum to one.
-    fn prune(&mut self) {
+    /// Answers the log of what they summed to.
+    fn prune(&mut self) -> f64 {
         self.points.retain(|point| point.log_weight.is_finite());
-        self.normalise();
+        let total = self.normalise();
         let least = RANGE_WEIGHT_MIN.ln();
         self.points.retain(|point| point.log_weight > least);
-        self.normalise();
+        total + self.normalise()
     }
 
-    fn normalise(&mut self) {
+    /// Makes the weights sum to one; answers the log of what they summed to.
+    fn normalise(&mut self) -> f64 {
         let weights = self.points.iter().map(|point| point.log_weight);
         let most = weights.clone().fold(f64::NEG_INFINITY, f64::max);
         let sum: f64 = weights.map(|weight| (weight - most).exp()).sum();
@@ -168,6 +194,7 @@ impl RangeHypotheses {
         for point in &mut self.points {
             point.log_weight -= total;
         }
+        total
     }
 
     /// The one place that is left, if it is certain enough for the joint estimate, which is linear:
@@ -230,6 +257,9 @@ impl RangeHypotheses {
 
 impl PointHypothesis {
     /// Takes in a distance; answers its squared innovation in units of its variance.
+    ///
+    /// It is direct with the probability β and else says nothing, so that the place becomes the
+    /// Gaussian of the same moments as both cases together (Bar-Shalom & Tse 1975).
     fn update(&mut self, range: &Range, variance: f64) -> f64 {
         let apart = self.position - range.antenna_m();
         let Some(expected) = ExpectedRange::new(&apart, &self.covariance) else {
@@ -240,27 +270,70 @@ impl PointHypothesis {
         let curved = (expected.curved + expected.bias_square).min(RANGE_CURVED_MAX * variance);
         let noise = variance + curved;
         let square = innovation * innovation / (expected.linear + noise);
-        self.log_weight += log_density(innovation, expected.linear + noise);
+        let density = RangeDensity::new(innovation, expected.linear + noise);
+        self.log_weight += density.total().ln();
+        let direct = density.direct_share();
         let total = expected.linear + noise * loss_of_weight(square);
         let gain = self.covariance * expected.direction / total;
-        self.position += gain * innovation;
-        self.covariance = symmetric(&(self.covariance - gain * gain.transpose() * total));
+        self.position += gain * (direct * innovation);
+        let spread = (1.0 - direct) * innovation * innovation - total;
+        self.covariance =
+            symmetric(&(self.covariance + gain * gain.transpose() * (direct * spread)));
         square
     }
 }
 
-/// Log of the density of an innovation with this variance [1/m]: mostly Student's t with four
-/// degrees of freedom, and sometimes anything that is too long.
-fn log_density(innovation: f64, variance: f64) -> f64 {
-    let square = innovation * innovation / variance;
-    let direct =
-        0.375 * (1.0 + square / RANGE_DOF).powf(-0.5 * (RANGE_DOF + 1.0)) / variance.sqrt();
-    let reflected = if innovation > 0.0 {
-        RANGE_REFLECTION_MAX_M.recip()
+/// Density of an innovation of a distance \[1/m\]: mostly Student's t with four degrees of freedom,
+/// and sometimes anything that is too long.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RangeDensity {
+    direct: f64,
+    reflected: f64,
+}
+
+impl RangeDensity {
+    /// Of an innovation \[m\] with this variance \[m²\].
+    pub(super) fn new(innovation: f64, variance: f64) -> Self {
+        let square = innovation * innovation / variance;
+        let direct =
+            0.375 * (1.0 + square / RANGE_DOF).powf(-0.5 * (RANGE_DOF + 1.0)) / variance.sqrt();
+        let reflected = if innovation > 0.0 {
+            RANGE_REFLECTION_MAX_M.recip()
+        } else {
+            0.0
+        };
+        Self {
+            direct: (1.0 - RANGE_REFLECTED) * direct,
+            reflected: RANGE_REFLECTED * reflected,
+        }
+    }
+
+    fn total(&self) -> f64 {
+        self.direct + self.reflected
+    }
+
+    /// Probability that the distance was no reflection.
+    pub(super) fn direct_share(&self) -> f64 {
+        if self.reflected > 0.0 {
+            self.direct / self.total()
+        } else {
+            1.0
+        }
+    }
+}
+
+/// Where a landmark may be by one distance, with equal weights.
+fn places(range: &Range, variance: f64, is_planar: bool) -> Vec<PointHypothesis> {
+    let mut points = if is_planar {
+        rings(range, variance)
     } else {
-        0.0
+        sphere(range, variance)
     };
-    ((1.0 - RANGE_REFLECTED) * direct + RANGE_REFLECTED * reflected).ln()
+    let log_weight = -(points.len() as f64).ln();
+    for point in &mut points {
+        point.log_weight = log_weight;
+    }
+    points
 }
 
 /// Rings about the antenna, in planes above it. What lies below it looks the same to a planar

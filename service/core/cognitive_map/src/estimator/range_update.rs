@@ -8,7 +8,7 @@ use super::frame::Frame;
 use super::jacobian::Block;
 use super::landmark_archive::ArchivedLandmark;
 use super::measurement_update::{CorrectionScope, Measurement, PastPose, point_block};
-use super::range_hypotheses::{ExpectedRange, loss_of_weight};
+use super::range_hypotheses::{ExpectedRange, RangeDensity, loss_of_weight};
 use super::sensor::SightingTarget;
 use super::tuning::{
     ARCHIVE_WIDENING, RANGE_JOIN_WIDENING, RANGE_TOO_LONG_SQUARE, RANGES_TOO_LONG_MAX,
@@ -189,7 +189,8 @@ impl Frame {
         member
             .range_sensor
             .note(seen, stamp_ns, sd_m, residual[0], spread);
-        let weighted = (variance + curved) * loss_of_weight(square);
+        let direct = RangeDensity::new(residual[0], spread + variance).direct_share();
+        let weighted = (variance + curved) * loss_of_weight(square) / direct;
         let weighted = Vector1::new(weighted);
         self.take_in(measurement, projection, &residual, &weighted, scope);
         outcome.verdict = Verdict::Accepted {

@@ -42,6 +42,21 @@ pub(super) const SENSOR_TARGETS_MAX: usize = 128;
 
 /// Longest interval between two motions over which a bias counts \[s\].
 pub(super) const MOTION_INTERVAL_S_MAX: f64 = 10.0;
+/// Fastest that a body goes which may be standing \[m/s\]: odometry of one that stands drifts by
+/// millimetres a second.
+pub(super) const STANDING_SPEED_MAX_M_S: f64 = 0.02;
+/// Fastest that it turns, in deviations of the bias.
+pub(super) const STANDING_RATE_SD: f64 = 3.0;
+/// How many times faster it must be seen to go to have been standing.
+pub(super) const STANDING_CONTRAST: f64 = 20.0;
+/// Least and most time over which a bias is read \[s\].
+pub(super) const STANDING_S_MIN: f64 = 1.0;
+pub(super) const STANDING_S_MAX: f64 = 100.0;
+/// Noise density of a standing gyroscope \[rad/s/√Hz\]. Source: data sheets of small ones give
+/// 0.0001 to 0.0005; wheels and engines shake.
+pub(super) const STANDING_RATE_SD_RAD_SQRT_S: f64 = 1e-3;
+/// Deviation of what a body turns by that seems to stand \[rad\]: it settles, or looks about.
+pub(super) const STANDING_TURN_SD_RAD: f64 = 0.02;
 /// Motions that are gathered before they are carried over to the covariance. Source: carrying it
 /// with each would be most of a motion's work (`docs/decisions/0028-motion-noise-is-gathered.md`).
 pub(super) const RUN_STEPS_MAX: u32 = 64;
@@ -177,9 +192,12 @@ pub(super) const CIRCLE_VARIANCE_MAX: f64 = 30.0;
 // --- Distances alone
 // ---------------------------------------------------------------------------
 
-/// Landmarks of which an agent knows distances alone. Source: memory; each has up to 288 places of
+/// Landmarks of which an agent knows distances alone. Source: memory; each has up to 576 places of
 /// 104 bytes.
 pub(super) const RANGED_MAX: usize = 32;
+/// Most places where one of them may be. Source: twice those by one distance, for the first ones may
+/// have been those of reflections.
+pub(super) const RANGE_POINTS_MAX: usize = 576;
 /// Places on a ring about the antenna. Source: with spacing and deviation of an eighth of a radian,
 /// an arc differs from its tangent by a hundredth of its radius.
 pub(super) const RANGE_RING_POINTS: u32 = 48;

@@ -338,3 +338,39 @@ fn a_thousand_agents_do_not_disturb_each_other() {
     );
     assert_eq!(map.trip_count(), 1_000);
 }
+
+/// A gyroscope drifts while the robot stands, and no less while it drives.
+#[test]
+fn what_is_read_at_a_stand_straightens_the_way() {
+    let bias_rad_s = 0.006;
+    for sense in [1.0, -1.0] {
+        // Ten motions a second.
+        let turn = [0.0, 0.0, sense * bias_rad_s * 0.1];
+        let errors = [0, 600].map(|n_stood| {
+            let (mut map, mut robot) = new_map();
+            robot.sample(&mut map, start_pose([0.0; 3], [0.0; 3]));
+            for _ in 0..n_stood {
+                robot.sample(&mut map, motion([0.0; 3], turn));
+            }
+            for _ in 0..300 {
+                robot.sample(&mut map, motion([0.1, 0.0, 0.0], turn));
+            }
+            robot.position(&map).y.abs()
+        });
+        // Thirty metres with a bias of 0.006 rad/s end 2.7 m beside the straight way.
+        assert!(errors[0] > 2.5 && errors[1] < 0.3, "{errors:?}");
+    }
+}
+
+/// Who tells that there is no gyroscope with a bias is taken at the word of the odometry.
+#[test]
+fn without_a_bias_a_slow_turn_on_the_spot_is_one() {
+    let mut map = CognitiveMap::new(settings(|settings| settings.bias_sd_rad_s = 0.0));
+    let mut robot = Robot::enrol(&mut map);
+    for _ in 0..200 {
+        robot.sample(&mut map, motion([0.0; 3], [0.0, 0.0, 0.0006]));
+    }
+    robot.sample(&mut map, motion([0.5, 0.0, 0.0], [0.0; 3]));
+    let (_, _, yaw) = robot.pose(&map).rotation.euler_angles();
+    assert!((yaw - 0.12).abs() < 1e-9, "{yaw}");
+}

@@ -125,6 +125,25 @@ fn distances_that_are_sometimes_far_too_long_mislead_nobody() {
     ranger.assert_found(1.5);
 }
 
+/// The first distances may be the wrong ones.
+#[test]
+fn a_beacon_is_found_whose_first_distances_were_reflected() {
+    for wrong in 1..4 {
+        let mut ranger = Ranger::new();
+        let reflected = |k: u32, beacon: usize| (beacon as u32 * 11 + k) % 44 < wrong;
+        for k in 0..4 {
+            ranger.measure(0, if k < wrong { 15.0 } else { 0.0 });
+        }
+        ranger.tour(
+            300,
+            |k, beacon| {
+                if reflected(k, beacon) { 15.0 } else { 0.0 }
+            },
+        );
+        ranger.assert_found(1.5);
+    }
+}
+
 /// On a straight way nobody can tell a beacon from its mirror image.
 #[test]
 fn a_beacon_is_not_found_before_the_robot_turns() {

@@ -30,11 +30,11 @@ use super::ranging::Ranging;
 use super::sensor::{Sensor, SightingTarget};
 use super::sighting_pair::{Anchor, NoisyMotion};
 use super::sightings::{CrossFrameSighting, PendingSighting};
+use super::standing::Standing;
 use super::tuning::{
     ARCHIVE_PART_MAX, ARCHIVE_PARTS, ASSOCIATIONS_MAX, CROSS_SIGHTINGS_MAX, FRAME_MATCHES_MAX,
     HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, NOISE_SHARES_MAX, NOISE_TARGETS_MAX, OBSERVERS_MAX,
-    PENDING_MAX, RANGE_LAYERS, RANGE_RING_POINTS, RANGE_SPHERE_POINTS, RANGED_MAX,
-    SENSOR_TARGETS_MAX,
+    PENDING_MAX, RANGE_POINTS_MAX, RANGED_MAX, SENSOR_TARGETS_MAX,
 };
 use ::state::{
     Codec, CorruptState, PagedVec, State, StateReader, StateWriter, state_of_enum, state_of_struct,
@@ -46,12 +46,6 @@ const DIM_MAX: usize = MEMBERS_MAX * BODY_DIM + LANDMARKS_MAX * LANDMARK_DIM;
 const AGENTS_MAX: usize = 1 << 24;
 /// Most frames: the map's, and one for each agent.
 const FRAMES_MAX: usize = AGENTS_MAX + 1;
-/// Most places where a landmark may be of which distances alone are known.
-const RANGE_POINTS_MAX: usize = {
-    let rings = (RANGE_LAYERS * RANGE_RING_POINTS) as usize;
-    let sphere = RANGE_SPHERE_POINTS as usize;
-    if rings > sphere { rings } else { sphere }
-};
 /// Most archived landmarks of a frame.
 const ARCHIVED_MAX: usize = ARCHIVE_PARTS * ARCHIVE_PART_MAX;
 
@@ -78,7 +72,13 @@ state_of_struct!(AgentFilter {
     run,
     history,
     is_planar,
-    noise
+    noise,
+    standing
+});
+state_of_struct!(Standing {
+    turned,
+    went_m,
+    time_s
 });
 state_of_struct!(NoisyMotion {
     by_lengths,
@@ -121,7 +121,8 @@ state_of_struct!(RangeHypotheses {
     path_m,
     used,
     taken,
-    outlying
+    outlying,
+    log_evidence
 });
 state_of_struct!(Ranging {
     landmarks as MapUpTo<RANGED_MAX>,
@@ -266,10 +267,15 @@ impl State for JointCovariance {
     }
 }
 
+/// Whether a matrix is the same to the last bit with rows for columns.
+fn is_symmetric(dim: usize, entries: &[f64]) -> bool {
+    let mirror = |at: usize| entries[at % dim * dim + at / dim];
+    (0..entries.len()).all(|at| entries[at].to_bits() == mirror(at).to_bits())
+}
+
 /// One half of a symmetric matrix, unless rounding made the halves differ.
 fn write_square(dim: usize, entries: &[f64], out: &mut StateWriter) {
-    let mirror = |at: usize| entries[at % dim * dim + at / dim];
-    let is_symmetric = (0..entries.len()).all(|at| entries[at].to_bits() == mirror(at).to_bits());
+    let is_symmetric = is_symmetric(dim, entries);
     is_symmetric.write(out);
     for row in 0..dim {
         let first = if is_symmetric { row } else { 0 };
@@ -280,19 +286,23 @@ fn write_square(dim: usize, entries: &[f64], out: &mut StateWriter) {
 }
 
 fn read_square(dim: usize, input: &mut StateReader<'_>) -> Result<Vec<f64>, CorruptState> {
-    let is_symmetric = bool::read(input)?;
+    let is_half = bool::read(input)?;
     let mut entries = vec![0.0; dim * dim];
     for row in 0..dim {
-        let first = if is_symmetric { row } else { 0 };
+        let first = if is_half { row } else { 0 };
         for column in first..dim {
             let entry = f64::read(input)?;
             entries[row * dim + column] = entry;
-            if is_symmetric {
+            if is_half {
                 entries[column * dim + row] = entry;
             }
         }
     }
-    Ok(entries)
+    if is_half == is_symmetric(dim, &entries) {
+        Ok(entries)
+    } else {
+        Err(CorruptState::Invalid)
+    }
 }
 
 impl State for Estimator {
