@@ -148,6 +148,7 @@ bench: release-lab ## the benchmarks, each beside its yardstick; ARGS="--json"
 	$(TARGET)/release/cogmap-lab bench recall $(ARGS)
 	$(TARGET)/release/cogmap-lab bench route $(ARGS)
 	$(TARGET)/release/cogmap-lab bench descriptors $(ARGS)
+	$(TARGET)/release/cogmap-lab bench touch --fold --objects 100,1000 $(ARGS)
 	$(TARGET)/release/cogmap-lab bench ingest $(ARGS)
 	$(TARGET)/release/cogmap-lab bench ingest --live 5 $(ARGS)
 	$(TARGET)/release/cogmap-lab bench http $(ARGS)

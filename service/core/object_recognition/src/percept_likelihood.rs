@@ -159,14 +159,17 @@ impl PerceptLikelihood<'_> {
                 },
                 None,
             ) => {
-                let own = numbers.map(|number| &packed[number as usize]);
-                let (levels, variances) = (
-                    own.map(|packed_place| packed_place.level),
-                    own.map(|packed_place| packed_place.level_variance),
-                );
-                likelihoods = std::array::from_fn(|k| {
-                    level_likelihood(value - levels[k], variances[k] + noise, *scale)
-                });
+                // Loops, since closures of arrays are not compiled for the widest vectors.
+                let (mut levels, mut variances) = ([0.0; LANES], [0.0; LANES]);
+                for (k, number) in numbers.iter().enumerate() {
+                    let own = &packed[*number as usize];
+                    (levels[k], variances[k]) = (own.level, own.level_variance);
+                }
+                for ((likelihood, level), variance) in
+                    likelihoods.iter_mut().zip(&levels).zip(&variances)
+                {
+                    *likelihood = level_likelihood(value - level, variance + noise, *scale);
+                }
             }
             _ => {
                 for (likelihood, number) in likelihoods.iter_mut().zip(&numbers[..count]) {

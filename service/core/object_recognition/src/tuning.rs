@@ -205,6 +205,10 @@ pub(crate) const MERGE_CELL_SD: f64 = 1.6;
 /// Squared distance, in variances, beyond which a place is not the one touched: e⁻¹⁶. Chosen.
 pub(crate) const GATE_SQUARED: f64 = 32.0;
 
+/// Distance from a search within which others share its list of places, per reach. Chosen by
+/// running time.
+pub(crate) const SHORTLIST_SLACK: f64 = 0.5;
+
 // Translations: the prefilter.
 
 /// Seeds of the prefilter. Of larger libraries every second place stands for two, or every third

@@ -67,6 +67,17 @@ impl LatticeIndex {
     /// Lists runs of the order that hold all places within `reach_m` of a point, and some others.
     pub(crate) fn runs(&self, point: &Point3<f64>, reach_m: f64, runs: &mut Vec<Range<u32>>) {
         runs.clear();
+        self.for_each_run(point, reach_m, |run| runs.push(run));
+    }
+
+    /// Visits runs of the order that hold all places within `reach_m` of a point, and some others,
+    /// in that order.
+    pub(crate) fn for_each_run(
+        &self,
+        point: &Point3<f64>,
+        reach_m: f64,
+        mut visit: impl FnMut(Range<u32>),
+    ) {
         let middle = self.lattice.phase_displacement(&point.coords) - self.low;
         let half = ROW * reach_m / self.lattice.spacing_m();
         let mut first = [0; 3];
@@ -81,22 +92,16 @@ impl LatticeIndex {
             first[axis] = floor_u32(from) as usize;
             last[axis] = (floor_u32(to) as usize).min(self.size[axis] - 1);
         }
-        runs.resize(
-            (last[0] + 1 - first[0]) * (last[1] + 1 - first[1]),
-            Range::default(),
-        );
-        let mut count = 0;
         for i in first[0]..=last[0] {
             for j in first[1]..=last[1] {
                 let row = (i * self.size[1] + j) * self.size[2];
                 let from = self.starts[row + first[2]];
                 let to = self.starts[row + last[2] + 1];
-                // Branch-free, since which rows have places is unpredictable: loads then overlap.
-                runs[count] = from..to;
-                count += usize::from(from < to);
+                if from < to {
+                    visit(from..to);
+                }
             }
         }
-        runs.truncate(count);
     }
 }
 

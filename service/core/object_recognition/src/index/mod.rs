@@ -7,4 +7,5 @@ pub(crate) mod lattice_index;
 pub(crate) mod nearest_grid;
 pub(crate) mod nearest_place;
 pub(crate) mod packed_places;
+pub(crate) mod shortlist;
 pub(crate) mod wide_places;

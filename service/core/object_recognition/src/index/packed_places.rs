@@ -13,6 +13,10 @@ use crate::tuning::{
     GATE_SQUARED, NEAREST_CELLS_PER_REACH, NEAREST_GROWTH, NEAREST_MARGIN, NEAREST_SD,
 };
 
+/// Error of a distance in single precision, per the lengths that it is computed of: several times
+/// that of a number.
+const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
+
 /// A place with what most places have: a position and one level.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PackedPlace {
@@ -37,11 +41,13 @@ pub(crate) struct PackedPlaces {
     /// Number of each among the model's places.
     order: Vec<u32>,
     pub(crate) middle: Point3<f64>,
-    lattice_index: LatticeIndex,
+    pub(crate) lattice_index: LatticeIndex,
     /// Places that are found without the index.
     pub(crate) wide: WidePlaces,
     /// Mean of the places' variances per axis \[m²\].
     pub(crate) variance_m2: f64,
+    /// Bound on the error of a distance by single precision \[m\].
+    rounding_m: f64,
     /// Channel and mean of the levels, if every place has one level of the same channel and no
     /// descriptor.
     levels: Option<(u16, f64)>,
@@ -110,6 +116,7 @@ impl PackedPlaces {
                     .collect(),
             ],
             axes,
+            rounding_m: ROUNDING * extent_m,
             variance_m2,
             all,
             order,
@@ -154,9 +161,20 @@ impl PackedPlaces {
     /// Lists runs of places that hold all that a point with this variance per axis \[m²\] could be
     /// of, and some others, but for the wide ones.
     pub(crate) fn runs(&self, point: &Point3<f64>, variance_m2: f64, runs: &mut Vec<Range<u32>>) {
+        self.lattice_index
+            .runs(point, self.reach_m(variance_m2), runs);
+    }
+
+    /// Distance within which all places lie that a point with this variance per axis \[m²\] could
+    /// be of \[m\], but for the wide ones.
+    fn reach_m(&self, variance_m2: f64) -> f64 {
         let widest_m2 = variance_m2 + f64::from(self.wide.narrow_max_m2);
-        let reach_m = (GATE_SQUARED * widest_m2).sqrt();
-        self.lattice_index.runs(point, reach_m, runs);
+        (GATE_SQUARED * widest_m2).sqrt()
+    }
+
+    /// The same, with room for whatever single precision finds within the gate.
+    pub(crate) fn rounded_reach_m(&self, variance_m2: f64) -> f64 {
+        (1.0 + ROUNDING) * self.reach_m(variance_m2) + self.rounding_m
     }
 }
 

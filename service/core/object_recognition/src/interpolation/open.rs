@@ -117,7 +117,7 @@ impl OpenRegion {
         let step = entries.len().div_ceil(ENTRIES_MAX).max(1);
         Some(Self {
             felt: places,
-            nearest: NearestPlace::new(felt, graph.typical_m),
+            nearest: NearestPlace::new(felt),
             entries: entries.into_iter().step_by(step).collect(),
             typical_m: graph.typical_m,
             unexpected: match spread {

@@ -1,14 +1,12 @@
 //! Candidates: the places that a touch could be of, given where a hypothesis predicts it.
 
-use std::ops::Range;
-
 use nalgebra::{Point3, Vector3};
 use pulp::Arch;
 
-use crate::index::packed_places::{PackedPlace, PackedPlaces};
-use crate::numeric::{exp, to_f32};
+use crate::index::packed_places::PackedPlaces;
+use crate::index::shortlist::Shortlist;
+use crate::numeric::exp;
 use crate::percept_likelihood::{LANES, PerceptLikelihood};
-use crate::tuning::GATE_SQUARED;
 
 /// A place that could be the one touched.
 #[derive(Clone, Copy, Debug)]
@@ -21,54 +19,62 @@ pub(crate) struct Candidate {
     pub(crate) variance: f64,
 }
 
-/// A place near the predicted point.
-#[derive(Clone, Copy, Debug, Default)]
-struct NearPlace {
-    number: u32,
-    /// Offset from the predicted point \[m\].
-    apart: [f32; 3],
-    square: f32,
-    /// Variance of that offset, per axis \[m²\].
-    variance: f32,
-}
-
 /// Buffers of a search, used again for every hypothesis.
 #[derive(Debug, Default)]
 pub(crate) struct CandidateSearch {
     arch: Arch,
-    runs: Vec<Range<u32>>,
-    all: Vec<NearPlace>,
+    shortlist: Shortlist,
+    /// Densities of the places that the shortlist found last.
+    densities: Vec<f64>,
 }
 
 impl CandidateSearch {
-    /// Lists the places that a touch predicted at `point` could be of, and returns the sum of their
-    /// densities. `prior` is the variance of the prediction and `noise` that of the touch, per axis
-    /// \[m²\].
-    pub(crate) fn candidates(
+    /// The searches that follow are elsewhere, or in another model: several beside one another, or
+    /// one alone.
+    pub(crate) fn begin(&mut self, several: bool) {
+        self.shortlist.begin(several);
+    }
+
+    /// Finds the places that a touch predicted at `point`, with this variance per axis \[m²\],
+    /// could be of, and returns the sum of their densities.
+    pub(crate) fn find(
         &mut self,
         packed: &PackedPlaces,
         point: &Point3<f64>,
-        (prior, noise): (f64, f64),
+        variance_m2: f64,
         local: &PerceptLikelihood<'_>,
-        candidates: &mut Vec<Candidate>,
     ) -> f64 {
-        candidates.clear();
-        self.weigh(
-            packed,
-            (point, prior + noise),
-            [local],
-            |near, [density]| {
-                candidates.push(Candidate {
-                    density,
-                    apart: Vector3::from(near.apart).cast(),
-                    variance: noise + f64::from(packed.all[near.number as usize].variance_m2),
-                });
-            },
-        )[0]
+        self.shortlist.find(packed, point, variance_m2);
+        let mut densities = std::mem::take(&mut self.densities);
+        densities.clear();
+        let [total] = self.weigh([local], |[density]| densities.push(density));
+        self.densities = densities;
+        total
     }
 
-    /// Density of a touch that should be at `point`, with this variance per axis \[m²\], for each
-    /// of several percepts: as [`candidates`](Self::candidates) has it.
+    /// Lists those that were found with a density of `least` at least. `noise_m2` is the variance
+    /// of the touch, per axis \[m²\].
+    pub(crate) fn candidates(
+        &self,
+        packed: &PackedPlaces,
+        (least, noise_m2): (f64, f64),
+        candidates: &mut Vec<Candidate>,
+    ) {
+        candidates.clear();
+        for (near, density) in self.shortlist.found().iter().zip(&self.densities) {
+            if *density >= least {
+                let own = &packed.all[near.number as usize];
+                candidates.push(Candidate {
+                    density: *density,
+                    apart: self.shortlist.apart(near).cast(),
+                    variance: noise_m2 + f64::from(own.variance_m2),
+                });
+            }
+        }
+    }
+
+    /// Sums of the densities of a touch that should be at `point`, with this variance per axis
+    /// \[m²\], for each of several percepts.
     pub(crate) fn densities<const N: usize>(
         &mut self,
         packed: &PackedPlaces,
@@ -76,22 +82,24 @@ impl CandidateSearch {
         variance_m2: f64,
         locals: [&PerceptLikelihood<'_>; N],
     ) -> [f64; N] {
-        self.weigh(packed, (point, variance_m2), locals, |_, _| ())
+        self.shortlist.begin(false);
+        self.shortlist.find(packed, point, variance_m2);
+        self.weigh(locals, |_| ())
     }
 
-    /// Visits the places with their densities for each of the percepts, and sums these up.
+    /// Visits the densities of the places that were found for each of the percepts, and sums these
+    /// up.
     fn weigh<const N: usize>(
-        &mut self,
-        packed: &PackedPlaces,
-        (point, variance_m2): (&Point3<f64>, f64),
+        &self,
         locals: [&PerceptLikelihood<'_>; N],
-        mut visit: impl FnMut(&NearPlace, [f64; N]),
+        visit: impl FnMut([f64; N]),
     ) -> [f64; N] {
-        let count = self.gather(packed, point, variance_m2);
-        let all = &self.all[..count];
+        let all = self.shortlist.found();
         self.arch.dispatch(
             #[inline(always)]
-            || {
+            move || {
+                // Given away, so that it is inlined: see `Shortlist::choose`.
+                let mut visit = visit;
                 let mut totals = [0.0; N];
                 for some in all.chunks(LANES) {
                     // Results of the unused lanes are dropped.
@@ -102,72 +110,29 @@ impl CandidateSearch {
                         squares[k] = near.square;
                         variances[k] = near.variance;
                     }
-                    let falls: [f32; LANES] = std::array::from_fn(|k| {
-                        let per = 1.0 / variances[k];
-                        exp(-0.5 * squares[k] * per) * per * per.sqrt()
-                    });
-                    let likelihoods =
-                        locals.map(|local| local.likelihoods_of(&numbers, some.len()));
-                    for (k, near) in some.iter().enumerate() {
-                        let fall = f64::from(falls[k]);
-                        let densities = likelihoods.map(|own| fall * f64::from(own[k]));
-                        for (total, density) in totals.iter_mut().zip(densities) {
-                            *total += density;
+                    let mut falls = [0.0_f32; LANES];
+                    for ((fall, square), variance) in falls.iter_mut().zip(&squares).zip(&variances)
+                    {
+                        let per = 1.0 / variance;
+                        *fall = exp(-0.5 * square * per) * per * per.sqrt();
+                    }
+                    let mut likelihoods = [[0.0; LANES]; N];
+                    for (own, local) in likelihoods.iter_mut().zip(locals) {
+                        *own = local.likelihoods_of(&numbers, some.len());
+                    }
+                    for (k, fall) in falls.iter().enumerate().take(some.len()) {
+                        let mut densities = [0.0; N];
+                        for ((density, total), own) in
+                            densities.iter_mut().zip(&mut totals).zip(&likelihoods)
+                        {
+                            *density = f64::from(*fall) * f64::from(own[k]);
+                            *total += *density;
                         }
-                        visit(near, densities);
+                        visit(densities);
                     }
                 }
                 totals
             },
         )
-    }
-
-    /// Fills `all` with the places within the gate, and returns their number; what follows is
-    /// stale.
-    fn gather(&mut self, packed: &PackedPlaces, point: &Point3<f64>, variance_m2: f64) -> usize {
-        let Self { runs, all, .. } = self;
-        packed.runs(point, variance_m2, runs);
-        let at: [f32; 3] = (point - packed.middle).map(to_f32).into();
-        let variance_m2 = to_f32(variance_m2);
-        let wide = &packed.wide;
-        let most = { runs.iter() }.map(|run| (run.end - run.start) as usize);
-        let most = most.sum::<usize>() + wide.numbers.len();
-        if all.len() < most {
-            all.resize(most, NearPlace::default());
-        }
-        let near = |number: u32, packed_place: &PackedPlace| {
-            let apart: [f32; 3] = [
-                packed_place.at[0] - at[0],
-                packed_place.at[1] - at[1],
-                packed_place.at[2] - at[2],
-            ];
-            let square = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
-            let variance = variance_m2 + packed_place.variance_m2;
-            let near = NearPlace {
-                number,
-                apart,
-                square,
-                variance,
-            };
-            let is_beyond = square > to_f32(GATE_SQUARED) * variance;
-            (near, !is_beyond)
-        };
-        let mut count = 0;
-        for run in runs {
-            let own = &packed.all[run.start as usize..run.end as usize];
-            for (number, packed_place) in run.zip(own) {
-                // Branch-free, since the outcome is unpredictable: loads then overlap.
-                let is_wide = packed_place.variance_m2 > wide.narrow_max_m2;
-                let (near, is_near) = near(number, packed_place);
-                all[count] = near;
-                count += usize::from(is_near && !is_wide);
-            }
-        }
-        for number in &wide.numbers {
-            let (near, is_near) = near(*number, &packed.all[*number as usize]);
-            all[count] = near;
-            count += usize::from(is_near);
-        }
-        count
     }
 }

@@ -84,18 +84,7 @@ impl GaussianSum {
         let mut buffers = SplitBuffers::default();
         let mut parts = Vec::with_capacity(2 * self.all.len());
         let all = std::mem::take(&mut self.all);
-        for own in all.chunk_by(|a, b| a.object == b.object) {
-            if let Some(indexed) = library.indexed(own[0].object) {
-                for own in own.chunk_by(|a, b| a.rotation == b.rotation) {
-                    let rotation = &self.rotations[usize::from(own[0].rotation)];
-                    let local = touch.percepts.at(indexed, rotation);
-                    for hypothesis in own {
-                        let touch = (&touch, &local);
-                        buffers.split(rotation, indexed, hypothesis, touch, &mut parts);
-                    }
-                }
-            }
-        }
+        buffers.split_all(library, &self.rotations, &all, &touch, &mut parts);
         if !self.prefilter.is_empty() {
             self.promote(library, before, &touch, &mut buffers, &mut parts);
         }

@@ -243,10 +243,7 @@ impl PrefilterGroup {
 
     /// Multiplies all weights.
     pub(crate) fn multiply(&mut self, by: f32) {
-        for weight in &mut self.weights {
-            *weight *= by;
-        }
-        self.weigh(0.0);
+        self.scale(by, 0.0);
     }
 
     /// Drops all seeds.
@@ -257,18 +254,23 @@ impl PrefilterGroup {
 
     /// Sums up the weights; those below `least` become 0.
     fn weigh(&mut self, least: f32) {
+        self.scale(1.0, least);
+    }
+
+    /// Multiplies all weights and sums them up; those below `least` become 0.
+    fn scale(&mut self, by: f32, least: f32) {
         let (weights, rest) = self.weights.as_chunks_mut::<8>();
         let mut sums = Arch::new().dispatch(
             #[inline(always)]
             || {
                 let mut sums = Sums::default();
                 for weights in weights {
-                    sums.add(weights, least);
+                    sums.add(weights, by, least);
                 }
                 sums
             },
         );
-        sums.add(rest, least);
+        sums.add(rest, by, least);
         self.sum = sums.all.iter().copied().map(f64::from).sum();
         self.most = sums.most.iter().copied().fold(0.0, f32::max);
         self.live = sums.live.iter().sum::<u32>() as usize;
@@ -295,17 +297,18 @@ impl PrefilterGroup {
 }
 
 impl Sums {
-    /// Adds up to eight weights; those below `least` become 0.
+    /// Adds up to eight weights, multiplied; those below `least` become 0.
     #[expect(
         clippy::inline_always,
         reason = "inlined into dispatched closures: compiled for their vectors"
     )]
     #[inline(always)]
-    fn add(&mut self, weights: &mut [f32], least: f32) {
+    fn add(&mut self, weights: &mut [f32], by: f32, least: f32) {
         let sums = { self.all.iter_mut() }
             .zip(&mut self.most)
             .zip(&mut self.live);
         for (weight, ((sum, most), live)) in weights.iter_mut().zip(sums) {
+            *weight *= by;
             *weight = if *weight < least { 0.0 } else { *weight };
             *sum += *weight;
             *most = if *weight > *most { *weight } else { *most };

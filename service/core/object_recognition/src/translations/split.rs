@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, UnitQuaternion};
 
 use crate::indexed_model::IndexedModel;
+use crate::library::ObjectLibrary;
 use crate::numeric::to_f32;
 use crate::percept_likelihood::PerceptLikelihood;
 use crate::translations::candidates::{Candidate, CandidateSearch};
@@ -22,12 +23,17 @@ pub(crate) struct SplitBuffers {
 }
 
 impl SplitBuffers {
+    /// The hypotheses that follow are of another model.
+    fn begin(&mut self, hypotheses: usize) {
+        self.search.begin(hypotheses > 1);
+    }
+
     /// Appends the parts of a hypothesis after a touch, each with its place taken for the one
     /// touched.
     ///
     /// A hypothesis of an outlier keeps its translation. The others are conditioned on their place
     /// by the Kalman gain g = P/(P + R), with the share of its density in the sum of all.
-    pub(crate) fn split(
+    fn split(
         &mut self,
         rotation: &UnitQuaternion<f64>,
         indexed: &IndexedModel,
@@ -40,9 +46,8 @@ impl SplitBuffers {
         let prior = hypothesis.variance_m2 + touch.drift_m2;
         let noise = contact.position_sd_m * contact.position_sd_m;
         let point = Point3::from(rotation * contact.position_m.coords + hypothesis.translation);
-        let variances = (prior, noise);
-        let densities =
-            (self.search).candidates(&indexed.packed, &point, variances, local, candidates);
+        let packed = &indexed.packed;
+        let densities = (self.search).find(packed, &point, prior + noise, local);
         let one = share(indexed.places.len()) / TAU.powf(1.5);
         let unpredicted = touch.unpredicted(hypothesis.object, indexed, &point, one * densities);
         let beyond = unpredicted.map_or(0.0, |own| own.density);
@@ -56,7 +61,7 @@ impl SplitBuffers {
             }
         }
         let least = SPLIT_SHARE_MIN * total;
-        candidates.retain(|candidate| candidate.density >= least);
+        (self.search).candidates(packed, (least, noise), candidates);
         if candidates.len() > SPLIT_MAX {
             candidates.sort_by(|a, b| b.density.total_cmp(&a.density));
             candidates.truncate(SPLIT_MAX);
@@ -92,6 +97,29 @@ impl SplitBuffers {
         }
     }
 
+    /// Appends the parts of hypotheses after a touch.
+    pub(crate) fn split_all(
+        &mut self,
+        library: &ObjectLibrary,
+        rotations: &[UnitQuaternion<f64>],
+        all: &[TranslationHypothesis],
+        touch: &TouchUpdate<'_>,
+        parts: &mut Vec<TranslationHypothesis>,
+    ) {
+        let maps = |own: &TranslationHypothesis| (own.object, own.rotation);
+        for own in all.chunk_by(|a, b| maps(a) == maps(b)) {
+            let Some(indexed) = library.indexed(own[0].object) else {
+                continue;
+            };
+            let rotation = &rotations[usize::from(own[0].rotation)];
+            let local = touch.percepts.at(indexed, rotation);
+            self.begin(own.len());
+            for hypothesis in own {
+                self.split(rotation, indexed, hypothesis, (touch, &local), parts);
+            }
+        }
+    }
+
     /// Appends the parts of a seed after all touches so far.
     pub(crate) fn replay(
         &mut self,
@@ -107,6 +135,7 @@ impl SplitBuffers {
         now.push(seed);
         for touch in touches {
             next.clear();
+            self.begin(now.len());
             let local = touch.percepts.at(indexed, rotation);
             for hypothesis in &now {
                 self.split(rotation, indexed, hypothesis, (*touch, &local), &mut next);

@@ -10,6 +10,7 @@ mod recall;
 mod route;
 mod step;
 mod touch;
+mod touch_fold;
 
 pub(super) use ingest::Bench;
 

@@ -14,6 +14,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde::Serialize;
 
+use super::touch_fold;
+
 /// Places of an object, at least: those of environment 3 are put together until they have so many.
 const PLACES: usize = 1000;
 /// Random explorations from an unknown start.
@@ -32,6 +34,7 @@ const NOISE: ExplorationNoise = ExplorationNoise {
 };
 
 #[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(in crate::cli) struct TouchArgs {
     /// Numbers of objects.
     #[arg(long, value_delimiter = ',', default_values_t = [10, 30, 100, 300])]
@@ -42,6 +45,10 @@ pub(in crate::cli) struct TouchArgs {
     /// Objects may have made one of 24 turns; otherwise their orientation is known.
     #[arg(long)]
     turned: bool,
+    /// Touches are samples of an agent and go through the fold: walks and touches anywhere, on
+    /// taught objects and on strangers.
+    #[arg(long, conflicts_with = "plain")]
+    fold: bool,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -67,10 +74,18 @@ struct Row {
 }
 
 pub(super) fn run(args: &TouchArgs) -> anyhow::Result<()> {
+    let orientation = if args.turned {
+        Orientation::cube()
+    } else {
+        Orientation::Known
+    };
+    if args.fold {
+        return touch_fold::run(&args.objects, &orientation, args.json);
+    }
     let mut rows = Vec::new();
     for &objects in &args.objects {
         output::progress(&format!("{objects} objects"));
-        rows.push(row(args, objects));
+        rows.push(row(args, &orientation, objects));
     }
     if args.json {
         return output::json(&Report { rows });
@@ -87,12 +102,7 @@ pub(super) fn run(args: &TouchArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn row(args: &TouchArgs, count: u32) -> Row {
-    let orientation = if args.turned {
-        Orientation::cube()
-    } else {
-        Orientation::Known
-    };
+fn row(args: &TouchArgs, orientation: &Orientation, count: u32) -> Row {
     let objects = (0..count).map(|number| VoxelObject::with_faces(SEED, number.into(), PLACES));
     let objects: Vec<VoxelObject> = objects.collect();
     let mut library = ObjectLibrary::default();
@@ -106,7 +116,7 @@ fn row(args: &TouchArgs, count: u32) -> Row {
         let contacts = explored(args.plain, &objects[number], episode);
         let mut least = [f64::INFINITY; TOUCHES];
         for run in 0..RUNS {
-            let mut recognition = Recognition::new(&orientation);
+            let mut recognition = Recognition::new(orientation);
             for (touch, contact) in contacts.iter().enumerate() {
                 let contact = contact.clone();
                 let begin = Instant::now();
