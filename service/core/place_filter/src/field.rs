@@ -21,6 +21,11 @@ pub trait Field {
     /// What a place remembers of a channel that counts for whoever asks.
     fn support(&self, place: u32, channel: u8) -> Option<Support>;
 
+    /// The level of that.
+    fn level(&self, place: u32, channel: u8) -> Option<f64> {
+        self.support(place, channel).map(|support| support.value)
+    }
+
     /// All places from one on, in order.
     fn places_from(&self, first: u32) -> Box<dyn Iterator<Item = u32> + '_>;
 

@@ -2,6 +2,8 @@
 
 use state::state_of_struct;
 
+use crate::exponential::exp;
+use crate::linear::{LANES, Row};
 use crate::tuning::channel as tuning;
 
 /// A field with noise: values at a distance d have the covariance σ² exp(−d²/2ℓ²), and each level
@@ -30,6 +32,24 @@ impl Kernel {
     #[inline]
     pub(crate) fn covariance(&self, squared_m2: f64) -> f64 {
         self.sill * (-0.5 * squared_m2 / (self.length_m * self.length_m)).exp()
+    }
+
+    /// The same of a point and of as many others as a row has, by their coordinates along each axis
+    /// \[m\].
+    #[expect(
+        clippy::inline_always,
+        reason = "compiled for the vectors of a dispatch"
+    )]
+    #[inline(always)]
+    pub(crate) fn covariances(&self, at: &[f64; 3], others: &[Row; 3]) -> Row {
+        let factor = -0.5 / (self.length_m * self.length_m);
+        let mut row = [0.0; LANES];
+        for lane in 0..LANES {
+            let by = [0, 1, 2].map(|axis| at[axis] - others[axis][lane]);
+            let squared = by[0] * by[0] + by[1] * by[1] + by[2] * by[2];
+            row[lane] = self.sill * exp(factor * squared);
+        }
+        row
     }
 
     /// Mean square of the field's slope along an axis, per square metre.

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod compass;
+mod exponential;
 mod field;
 mod filter;
 mod follow;

@@ -82,8 +82,13 @@ impl<T> Page<T> {
 
     /// The items with their indices, the first index of the page being `first`.
     fn iter(&self, first: usize) -> impl Iterator<Item = (usize, &T)> {
-        let mut left = self.mask;
-        self.items.iter().map(move |item| {
+        self.iter_from(first, 0)
+    }
+
+    /// The same from an index of the page on.
+    fn iter_from(&self, first: usize, start: usize) -> impl Iterator<Item = (usize, &T)> {
+        let mut left = self.mask & (u64::MAX << start);
+        self.items[self.rank(start)..].iter().map(move |item| {
             let index = left.trailing_zeros() as usize;
             left &= left - 1;
             (first + index, item)
@@ -134,9 +139,10 @@ impl<T, const N: usize> SparseVec<T, N> {
 
     /// The items from an index on, with their indices, in order.
     pub fn iter_from(&self, start: usize) -> impl Iterator<Item = (usize, &T)> {
-        self.pages_from(start / N)
-            .flat_map(|(at, page)| page.iter(at * N))
-            .skip_while(move |(index, _)| *index < start)
+        self.pages_from(start / N).flat_map(move |(at, page)| {
+            let first = at * N;
+            page.iter_from(first, start.saturating_sub(first))
+        })
     }
 
     /// The items with their indices, in order.
@@ -197,9 +203,8 @@ impl<T, const N: usize> SparseVec<T, N> {
                 Slot::Live(chunk) => &chunk[..],
                 Slot::Gone(_) => &[],
             };
-            let pages = (at * CHUNK..)
-                .zip(pages)
-                .skip_while(move |(page, _)| *page < start);
+            let skipped = start.saturating_sub(at * CHUNK).min(pages.len());
+            let pages = (at * CHUNK + skipped..).zip(&pages[skipped..]);
             pages.filter_map(|(at, page)| match page {
                 Slot::Live(page) => Some((at, &**page)),
                 Slot::Gone(_) => None,

@@ -1,7 +1,7 @@
 //! Levels: they teach places, say where the agent is among them, and whether it is there at all.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use place_filter::{Field, Found, Kernel, Measured, Seeker, SensedLevel, Support};
+use place_filter::{Field, Found, Kernel, Measured, Seeker, SensedLevel, Support, Trace};
 
 use super::apply::Fold;
 use super::tuning::{NEAR_REACHES, OWN_SURER, UPRIGHT_SD_RAD};
@@ -214,6 +214,16 @@ impl Fold<'_> {
     }
 }
 
+impl Levels<'_> {
+    /// What a place remembers that counts for the agent: what it has taught itself while it was
+    /// hardly surer than now says nothing new.
+    fn trace(&self, place: PlaceId, channel: u8) -> Option<&Trace> {
+        let trace = self.percepts.trace(place, channel)?;
+        let is_old = trace.teacher == self.agent && OWN_SURER * trace.spread_m2 > self.variance_m2;
+        (!is_old).then_some(trace)
+    }
+}
+
 impl Field for Levels<'_> {
     fn kernel(&self, channel: u8) -> Option<&Kernel> {
         self.percepts.kernel(channel)
@@ -234,14 +244,14 @@ impl Field for Levels<'_> {
         positions.collect()
     }
 
+    fn level(&self, place: u32, channel: u8) -> Option<f64> {
+        Some(self.trace(PlaceId(place), channel)?.value)
+    }
+
     fn support(&self, place: u32, channel: u8) -> Option<Support> {
         let place = PlaceId(place);
-        let trace = self.percepts.trace(place, channel)?;
+        let trace = self.trace(place, channel)?;
         let is_own = trace.teacher == self.agent;
-        // What it has taught itself while it was hardly surer than now says nothing new.
-        if is_own && OWN_SURER * trace.spread_m2 > self.variance_m2 {
-            return None;
-        }
         Some(Support {
             at: self.places.get(place)?.position() + trace.offset_m,
             value: trace.value,

@@ -1,36 +1,48 @@
 //! What the levels of a way say at a pose: the field at all of its nodes at once.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
+use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
+use pulp::Arch;
 
+use super::points::{Lanes, Points, put};
 use crate::field::Field;
 use crate::kernel::Kernel;
-use crate::linear::Lower;
+use crate::linear::{LANES, Lower, Row, subtract_products};
 use crate::prediction::Support;
 use crate::tuning::search as tuning;
 use crate::window::Node;
 
+const _: () = assert!(tuning::NODES <= LANES, "the nodes of a way are a row");
+
 /// What is remembered about a way of one channel, and what was sensed along it.
 pub(super) struct ChannelOfWay {
     kernel: Kernel,
-    supports: Vec<Support>,
+    supports: Points,
     factor: Lower,
     /// Weights of the values that are remembered.
     weights: Vec<f64>,
-    /// Where it was sensed, by motion alone, the way from there to its end \[m\], and the level
-    /// less the channel's mean.
-    felt: Vec<(Point3<f64>, f64, f64)>,
-    /// Log density of these levels outside the map.
+    felt: Vec<FeltAt>,
+    /// Log density of its levels outside the map.
     anywhere: f64,
 }
 
-/// What a channel says at a pose.
+/// A level of the way.
+pub(super) struct FeltAt {
+    /// Where it was sensed, by motion alone \[m\].
+    pub(super) at: Point3<f64>,
+    /// How far odometry may be off from there to the end of the way \[m\].
+    pub(super) drift_m: f64,
+    /// The level less the channel's mean.
+    level: f64,
+}
+
+/// What a channel says at a pose, of each of its levels; the lanes after them hold nothing.
 pub(super) struct Expected {
     /// Levels less what is expected.
-    pub(super) residuals: DVector<f64>,
+    pub(super) residuals: Row,
     /// Covariance of that by the noise, and by what the places leave open.
-    pub(super) covariance: DMatrix<f64>,
-    /// Change of each level per metre along the axes of the map.
-    pub(super) slopes: Vec<Vector3<f64>>,
+    pub(super) covariance: [Row; LANES],
+    /// Change of each level per metre along each axis of the map.
+    pub(super) slopes: Lanes,
 }
 
 /// The channels of the nodes that were sensed along a way, with the places about it if the frame of
@@ -106,43 +118,30 @@ impl ChannelOfWay {
         let end_m = used.last().map_or(0.0, |node| node.way_m);
         let of_channel = |node: &&Node| {
             let felt = node.felt.iter().find(|felt| felt.channel == channel)?;
-            Some((felt.at, end_m - node.way_m, felt.value - kernel.mean))
+            Some(FeltAt {
+                at: felt.at,
+                drift_m: tuning::DRIFT * (end_m - node.way_m),
+                level: felt.value - kernel.mean,
+            })
         };
-        let felt: Vec<_> = used.iter().filter_map(of_channel).collect();
-        let factor = Lower::factor(supports.len(), |row, column| {
-            let (a, b) = (&supports[row], &supports[column]);
-            let own = if row == column {
-                noise_of(&kernel, a)
-            } else {
-                0.0
-            };
-            kernel.covariance((a.at - b.at).norm_squared()) + own
-        })?;
+        let felt: Vec<FeltAt> = used.iter().filter_map(of_channel).collect();
+        let points = Points::new(supports.iter().map(|support| &support.at));
+        let factor = factor(&kernel, &points, |row| noise_of(&kernel, &supports[row]))?;
         let mut weights: Vec<f64> = supports.iter().map(|s| s.value - kernel.mean).collect();
-        factor.forwards(&mut weights, 1);
-        factor.backwards(&mut weights, 1);
-        let outside = Lower::factor(felt.len(), |row, column| {
-            let noise = if row == column { kernel.nugget } else { 0.0 };
-            kernel.covariance((felt[row].0 - felt[column].0).norm_squared()) + noise
-        })?;
-        let mut levels: Vec<f64> = felt.iter().map(|(_, _, level)| *level).collect();
-        outside.forwards(&mut levels, 1);
-        let anywhere = density(&levels) - outside.log_root();
+        factor.solve(&mut weights);
         Some(Self {
+            anywhere: anywhere(&kernel, &felt)?,
             kernel,
-            supports,
+            supports: points,
             factor,
             weights,
             felt,
-            anywhere,
         })
     }
 
-    /// Where each of its levels was sensed, by motion alone, and how far odometry may be off from
-    /// there to the end of the way \[m\].
-    pub(super) fn points(&self) -> impl Iterator<Item = (&Point3<f64>, f64)> {
-        let felt = self.felt.iter();
-        felt.map(|(at, way_m, _)| (at, tuning::DRIFT * way_m))
+    /// Its levels.
+    pub(super) fn felt(&self) -> &[FeltAt] {
+        &self.felt
     }
 
     /// Log density of its levels outside the map \[nats\].
@@ -158,52 +157,56 @@ impl ChannelOfWay {
     ///
     /// and if odometry is off by `drift`, in its deviations.
     pub(super) fn expect(&self, pose: &Isometry3<f64>, drift: &Vector3<f64>) -> Expected {
-        let (n, m) = (self.supports.len(), self.felt.len());
-        let points = self.points();
-        let points: Vec<_> = points
-            .map(|(at, drift_m)| pose * at + drift * drift_m)
-            .collect();
-        let squared_length = self.kernel.length_m * self.kernel.length_m;
-        let mut to_points = vec![0.0; n * m];
-        let mut slopes = vec![Vector3::zeros(); m];
-        let mut residuals: Vec<f64> = self.felt.iter().map(|(_, _, level)| *level).collect();
-        for (row, support) in self.supports.iter().enumerate() {
-            for (k, at) in points.iter().enumerate() {
-                let by = support.at - at;
-                let covariance = self.kernel.covariance(by.norm_squared());
-                to_points[row * m + k] = covariance;
-                let part = self.weights[row] * covariance;
-                residuals[k] -= part;
-                slopes[k] += by * (part / squared_length);
-            }
+        let mut points = [[0.0; LANES]; 3];
+        let mut residuals = [0.0; LANES];
+        for (lane, felt) in self.felt.iter().enumerate() {
+            put(&mut points, lane, &(pose * felt.at + drift * felt.drift_m));
+            residuals[lane] = felt.level;
         }
-        self.factor.forwards(&mut to_points, m);
-        let mut covariance = DMatrix::zeros(m, m);
-        for a in 0..m {
-            for b in 0..=a {
-                let prior = self
-                    .kernel
-                    .covariance((points[a] - points[b]).norm_squared());
-                covariance[(a, b)] = prior;
-            }
-        }
-        for row in to_points.chunks_exact(m) {
-            for a in 0..m {
-                for b in 0..=a {
-                    covariance[(a, b)] -= row[a] * row[b];
+        let mut expected = Expected {
+            residuals,
+            covariance: [[0.0; LANES]; LANES],
+            slopes: [[0.0; LANES]; 3],
+        };
+        let mut to_points = vec![[0.0; LANES]; self.supports.len()];
+        Arch::new().dispatch(
+            #[inline(always)]
+            || self.fill(&points, &mut to_points, &mut expected),
+        );
+        expected
+    }
+
+    /// Works out what is expected at these points.
+    #[expect(
+        clippy::inline_always,
+        reason = "compiled for the vectors of a dispatch"
+    )]
+    #[inline(always)]
+    fn fill(&self, points: &Lanes, to_points: &mut [Row], expected: &mut Expected) {
+        for (number, row) in to_points.iter_mut().enumerate() {
+            let at = self.supports.at(number);
+            *row = self.kernel.covariances(&at, points);
+            for lane in 0..LANES {
+                let part = self.weights[number] * row[lane];
+                expected.residuals[lane] -= part;
+                for axis in 0..3 {
+                    expected.slopes[axis][lane] += part * (at[axis] - points[axis][lane]);
                 }
             }
         }
-        for a in 0..m {
-            covariance[(a, a)] = covariance[(a, a)].max(0.0) + self.kernel.nugget;
-            for b in 0..a {
-                covariance[(b, a)] = covariance[(a, b)];
-            }
+        let squared_length = self.kernel.length_m * self.kernel.length_m;
+        for slope in expected.slopes.iter_mut().flatten() {
+            *slope /= squared_length;
         }
-        Expected {
-            residuals: DVector::from_vec(residuals),
-            covariance,
-            slopes,
+        self.factor.forwards_inline(to_points);
+        for (lane, row) in expected.covariance.iter_mut().enumerate() {
+            *row = self
+                .kernel
+                .covariances(&points.map(|axis| axis[lane]), points);
+        }
+        subtract_products(to_points, &mut expected.covariance);
+        for (lane, row) in expected.covariance.iter_mut().enumerate() {
+            row[lane] = row[lane].max(0.0) + self.kernel.nugget;
         }
     }
 
@@ -218,32 +221,35 @@ impl ChannelOfWay {
     /// up of it.
     pub(super) fn made_up_slopes(&self, pose: &Isometry3<f64>) -> Option<[DMatrix<f64>; 3]> {
         let m = self.felt.len();
-        let points: Vec<_> = self.points().map(|(at, _)| pose * at).collect();
+        let mut points = [[0.0; LANES]; 3];
+        for (lane, felt) in self.felt.iter().enumerate() {
+            put(&mut points, lane, &(pose * felt.at));
+        }
         let squared_length = self.kernel.length_m * self.kernel.length_m;
         let mut all = std::array::from_fn(|_| DMatrix::zeros(0, 0));
         for (axis, made_up) in all.iter_mut().enumerate() {
-            let mut rows = Vec::with_capacity(self.supports.len() * m);
-            for support in &self.supports {
-                rows.extend(points.iter().map(|at| {
-                    let by = support.at - at;
-                    by[axis] * self.kernel.covariance(by.norm_squared()) / squared_length
-                }));
-            }
-            self.factor.forwards(&mut rows, m);
-            let mut errors = DMatrix::from_fn(m, m, |a, b| {
-                let by = points[a] - points[b];
-                let part = (1.0 - by[axis] * by[axis] / squared_length) / squared_length;
-                self.kernel.covariance(by.norm_squared()) * part
+            let by_axis = |at: &[f64; 3], factor: &dyn Fn(f64) -> f64| -> Row {
+                let mut row = self.kernel.covariances(at, &points);
+                for (entry, along) in row.iter_mut().zip(&points[axis]) {
+                    *entry *= factor(at[axis] - along) / squared_length;
+                }
+                row
+            };
+            let mut rows: Vec<Row> = (0..self.supports.len())
+                .map(|number| by_axis(&self.supports.at(number), &|by| by))
+                .collect();
+            self.factor.forwards(&mut rows);
+            let mut errors: [Row; LANES] = std::array::from_fn(|lane| {
+                let at = points.map(|axis| axis[lane]);
+                by_axis(&at, &|by| 1.0 - by * by / squared_length)
             });
-            let mut unknown = errors.clone();
+            let mut unknown = symmetric(&errors, m);
             for k in 0..m {
                 // Slopes at neighbouring nodes are nearly one.
                 unknown[(k, k)] *= 1.0 + tuning::SLOPES_APART;
             }
-            for row in rows.chunks_exact(m) {
-                let row = DVector::from_column_slice(row);
-                errors.ger(-1.0, &row, &row, 1.0);
-            }
+            subtract_products(&rows, &mut errors);
+            let errors = symmetric(&errors, m);
             let owned = unknown.cholesky()?.l().solve_lower_triangular(&errors)?;
             *made_up = errors - owned.transpose() * owned;
         }
@@ -251,9 +257,38 @@ impl ChannelOfWay {
     }
 }
 
+/// The factor of the covariance of levels at some points, with the noise of each.
+fn factor(kernel: &Kernel, points: &Points, noise: impl Fn(usize) -> f64) -> Option<Lower> {
+    Lower::factor(
+        points.len(),
+        #[inline(always)]
+        |row, first| {
+            let mut entries = kernel.covariances(&points.at(row), points.from(first));
+            if let Some(own) = row.checked_sub(first).and_then(|own| entries.get_mut(own)) {
+                *own += noise(row);
+            }
+            entries
+        },
+    )
+}
+
+/// Log density of levels outside the map \[nats\].
+fn anywhere(kernel: &Kernel, felt: &[FeltAt]) -> Option<f64> {
+    let points = Points::new(felt.iter().map(|felt| &felt.at));
+    let outside = factor(kernel, &points, |_| kernel.nugget)?;
+    let mut levels: Vec<Row> = felt.iter().map(|felt| [felt.level; LANES]).collect();
+    outside.forwards(&mut levels);
+    Some(density(levels.iter().map(|row| &row[0])) - outside.log_root())
+}
+
 /// Variance of what a place remembers: of the sensor, and by where it was.
 fn noise_of(kernel: &Kernel, support: &Support) -> f64 {
     kernel.nugget + kernel.squared_slope() * support.spread_m2
+}
+
+/// The symmetric matrix of which a diagonal is given, and what is right of that.
+pub(super) fn symmetric(upper: &[Row; LANES], n: usize) -> DMatrix<f64> {
+    DMatrix::from_fn(n, n, |a, b| upper[a.min(b)][a.max(b)])
 }
 
 /// Log density of independent standard normal values, but for a constant of their number; one that

@@ -9,6 +9,7 @@
 //! ```
 
 mod channel_of_way;
+mod points;
 mod refinement;
 mod seeds;
 

@@ -4,19 +4,21 @@ use std::f64::consts::TAU;
 
 use geometry::{OUT_OF_PLANE, se3};
 use nalgebra::{
-    DMatrix, Isometry3, Matrix3, Matrix6, Point3, SMatrix, SVector, UnitQuaternion, Vector2,
-    Vector3, Vector6,
+    DMatrix, Isometry3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector2, Vector3, Vector6,
 };
+use pulp::Arch;
 
 use super::Seeker;
-use super::channel_of_way::{ChannelOfWay, channels, density};
+use super::channel_of_way::{ChannelOfWay, channels, density, symmetric};
 use crate::field::Field;
-use crate::follow::point_by_pose;
+use crate::linear::{LANES, factor_upper, solve_upper};
 use crate::tuning::search as tuning;
 use crate::window::Node;
 
 /// Information that holds a component \[1/m², 1/rad²\].
 const HELD: f64 = 1e12;
+/// Where the residual stands in the row of a level, after the Jacobian.
+const RESIDUAL: usize = 9;
 
 /// Components of the error of the body, then of what odometry was off by.
 type Vector9 = SVector<f64, 9>;
@@ -155,14 +157,20 @@ impl<'a> Way<'a> {
     /// Part of the information that errors of the slopes make up.
     fn doubt(&self, refined: &Refined) -> Option<Matrix6<f64>> {
         let mut doubt = Matrix6::zeros();
-        let body = refined.pose * self.seeker.in_odom;
+        let to_body = self.seeker.in_odom.inverse();
+        let to_axes = (refined.pose * self.seeker.in_odom).rotation.inverse();
         for channel in &self.channels {
-            let by_pose = self.by_pose(&body, channel);
             let expected = channel.expect(&refined.pose, &refined.drift);
-            let inverse = expected.covariance.cholesky()?.inverse();
+            let covariance = symmetric(&expected.covariance, channel.felt().len());
+            let inverse = covariance.cholesky()?.inverse();
             for (axis, errors) in channel.made_up_slopes(&refined.pose)?.iter().enumerate() {
                 let weights = inverse.component_mul(errors);
-                let rows = DMatrix::from_fn(by_pose.len(), 6, |k, by| by_pose[k][(axis, by)]);
+                let slope = to_axes * Vector3::ith(axis, 1.0);
+                let felt = channel.felt().iter();
+                let rows: Vec<_> = felt
+                    .map(|felt| point_by_body(&slope, &(to_body * felt.at).coords).transpose())
+                    .collect();
+                let rows = DMatrix::from_fn(rows.len(), 6, |k, by| rows[k][by]);
                 let made_up = rows.transpose() * weights * rows;
                 doubt += made_up.fixed_view::<6, 6>(0, 0) * tuning::DOUBT;
             }
@@ -174,22 +182,6 @@ impl<'a> Way<'a> {
             }
         }
         Some(doubt)
-    }
-
-    /// How the points at which a channel was sensed move with the error of the body and with what
-    /// odometry was off by.
-    fn by_pose(&self, body: &Isometry3<f64>, channel: &ChannelOfWay) -> Vec<SMatrix<f64, 3, 9>> {
-        let to_body = self.seeker.in_odom.inverse();
-        let rotation = body.rotation.to_rotation_matrix();
-        let by_pose = |(at, drift_m): (&Point3<f64>, f64)| {
-            let mut by_pose = SMatrix::<f64, 3, 9>::zeros();
-            let of_body = point_by_pose(rotation.matrix(), &(to_body * at).coords);
-            by_pose.fixed_view_mut::<3, 6>(0, 0).copy_from(&of_body);
-            let of_drift = Matrix3::from_diagonal_element(drift_m);
-            by_pose.fixed_view_mut::<3, 3>(0, 6).copy_from(&of_drift);
-            by_pose
-        };
-        channel.points().map(by_pose).collect()
     }
 
     /// The equations at a pose of the body.
@@ -206,28 +198,8 @@ impl<'a> Way<'a> {
         }
         let mut count = 0.0;
         for channel in &self.channels {
-            let expected = channel.expect(&pose, drift);
-            let by_pose = self.by_pose(body, channel);
-            let mut jacobian = DMatrix::zeros(by_pose.len(), 9);
-            for (k, (slope, by_pose)) in expected.slopes.iter().zip(&by_pose).enumerate() {
-                jacobian
-                    .fixed_view_mut::<1, 9>(k, 0)
-                    .copy_from(&(slope.transpose() * by_pose));
-            }
-            let factor = expected.covariance.cholesky()?.unpack();
-            let independent = factor.solve_lower_triangular(&expected.residuals)?;
-            let rows = factor.solve_lower_triangular(&jacobian)?;
-            for (residual, row) in independent.iter().zip(rows.row_iter()) {
-                let weight = (tuning::HUBER_SD / residual.abs()).min(1.0);
-                let row = row.fixed_columns::<9>(0);
-                sums.information += row.transpose() * row * weight;
-                sums.gradient += row.transpose() * (residual * weight);
-                sums.misfit += (residual * residual).min(6.25);
-                count += 1.0;
-            }
-            let log_root: f64 = factor.diagonal().iter().map(|entry| entry.ln()).sum();
-            let odds = density(&independent) - log_root - channel.anywhere();
-            sums.log_odds += ((1.0 - tuning::LIES) * odds.exp() + tuning::LIES).ln();
+            self.add(channel, (body, &pose, drift), &mut sums)?;
+            count += channel.felt().len() as f64;
         }
         sums.misfit /= f64::max(count, 1.0);
         // No pose is farther off than this, which keeps the equations solvable.
@@ -241,6 +213,58 @@ impl<'a> Way<'a> {
         sums.log_odds -= 0.5 * drift.norm_squared();
         self.hold_upright(&mut sums, body);
         Some(sums)
+    }
+
+    /// Adds what a channel says.
+    fn add(
+        &self,
+        channel: &ChannelOfWay,
+        (body, pose, drift): (&Isometry3<f64>, &Isometry3<f64>, &Vector3<f64>),
+        sums: &mut Equations,
+    ) -> Option<()> {
+        let expected = channel.expect(pose, drift);
+        let (to_body, to_axes) = (self.seeker.in_odom.inverse(), body.rotation.inverse());
+        // Of each level its Jacobian, and its residual.
+        let mut rows = [[0.0; LANES]; LANES];
+        for (k, (row, felt)) in rows.iter_mut().zip(channel.felt()).enumerate() {
+            let slope = Vector3::from(expected.slopes.map(|axis| axis[k]));
+            let by_body = point_by_body(&(to_axes * slope), &(to_body * felt.at).coords);
+            row[..6].copy_from_slice(by_body.as_slice());
+            row[6..9].copy_from_slice((slope * felt.drift_m).as_slice());
+            row[RESIDUAL] = expected.residuals[k];
+        }
+        let rows = &mut rows[..channel.felt().len()];
+        let mut factor = expected.covariance;
+        let mut inverse = [0.0; LANES];
+        let mut products = [[0.0; LANES]; RESIDUAL + 1];
+        let is_definite = Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                let is_definite = factor_upper(&mut factor, &mut inverse, rows.len());
+                solve_upper(&factor, &inverse, rows);
+                for row in rows.iter() {
+                    let weight = (tuning::HUBER_SD / row[RESIDUAL].abs()).min(1.0);
+                    for (products, factor) in products.iter_mut().zip(row) {
+                        for lane in 0..LANES {
+                            products[lane] += factor * weight * row[lane];
+                        }
+                    }
+                }
+                is_definite
+            },
+        );
+        if !is_definite {
+            return None;
+        }
+        sums.information += Matrix9::from_fn(|a, b| products[a][b]);
+        sums.gradient += Vector9::from_fn(|k, _| products[RESIDUAL][k]);
+        let residuals = || rows.iter().map(|row| &row[RESIDUAL]);
+        let squared = residuals().map(|residual| (residual * residual).min(6.25));
+        sums.misfit += squared.sum::<f64>();
+        let log_root: f64 = (0..rows.len()).map(|k| factor[k][k].ln()).sum();
+        let odds = density(residuals()) - log_root - channel.anywhere();
+        sums.log_odds += ((1.0 - tuning::LIES) * odds.exp() + tuning::LIES).ln();
+        Some(())
     }
 
     /// Adds what is known of the vertical.
@@ -279,4 +303,11 @@ fn tilt_variance(sd_rad: f64, way_m: f64) -> f64 {
 fn tilt(pose: &Isometry3<f64>, upright: &UnitQuaternion<f64>) -> Vector2<f64> {
     let up = pose.rotation * (upright.inverse() * Vector3::z());
     up.xy()
+}
+
+/// Change of a level with the error on the right of the pose of the body, by its slope and where it
+/// was sensed \[m\], both in axes of the body.
+fn point_by_body(slope: &Vector3<f64>, lever: &Vector3<f64>) -> Vector6<f64> {
+    let turned = lever.cross(slope);
+    Vector6::new(slope.x, slope.y, slope.z, turned.x, turned.y, turned.z)
 }

@@ -82,10 +82,8 @@ pub(super) fn scan(
     for place in field.places_from(first).take(tuning::SCANNED as usize) {
         (last, count) = (Some(place), count + 1);
         values.clear();
-        values.extend(channels.iter().map(|(channel, _)| {
-            let support = field.support(place, *channel);
-            support.map(|support| support.value)
-        }));
+        let level = |(channel, _): &(u8, Alike)| field.level(place, *channel);
+        values.extend(channels.iter().map(level));
         for ((node, asked), least) in (0u8..).zip(&asked).zip(least) {
             let mut odds = 1.0;
             for asked in asked {

@@ -11,6 +11,7 @@ mod route;
 mod step;
 mod touch;
 mod touch_fold;
+mod views;
 
 pub(super) use ingest::Bench;
 
@@ -24,6 +25,9 @@ pub(in crate::cli) enum BenchCommand {
     Recall(recall::RecallArgs),
     /// Recall of places by a descriptor, at different numbers of places.
     Descriptors(descriptors::DescriptorsArgs),
+    /// A view of a robot that knows where it is and of one that does not, at different numbers of
+    /// earlier views.
+    Views(views::ViewsArgs),
     /// Routes over ways, at different numbers of places.
     Route(route::RouteArgs),
     /// A touch and its answer, at different numbers of objects.
@@ -44,6 +48,7 @@ pub(super) fn run(command: &BenchCommand) -> anyhow::Result<()> {
         BenchCommand::Step(args) => step::run(args),
         BenchCommand::Recall(args) => recall::run(args),
         BenchCommand::Descriptors(args) => descriptors::run(args),
+        BenchCommand::Views(args) => views::run(args),
         BenchCommand::Route(args) => route::run(args),
         BenchCommand::Touch(args) => touch::run(args),
         BenchCommand::Life(args) => life::run(args),

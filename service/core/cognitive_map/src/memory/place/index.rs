@@ -13,6 +13,8 @@ const SHARD_BITS_STEP: u32 = 3;
 const SHARD_BITS_MAX: u32 = 12;
 /// Places per shard at which it is worth having more of them, counted in the larger number.
 const PLACES_PER_SHARD: usize = 4;
+/// Bits of a shard that tell which blocks hold no place, in words.
+const OCCUPIED_WORDS: usize = 4;
 /// Lowest bits of a tag: which of the cells of a block.
 const BLOCK_BITS: u32 = 3;
 /// A search over more cells than this along any axis is left to a scan.
@@ -34,16 +36,26 @@ struct Entry {
 }
 
 /// Places by the cells that they lie in.
-type Shard = Arc<Vec<Entry>>;
+#[derive(Clone, Debug, Default)]
+struct Shard {
+    /// A bit for each of some classes of blocks, set where one of them holds a place. Most blocks
+    /// beside a way are empty, and to find that out among the entries takes several times as long.
+    occupied: [u64; OCCUPIED_WORDS],
+    /// Sorted by tag and place, so the places of one cell lie side by side.
+    entries: Arc<[Entry]>,
+}
 
 /// The cells that hold places. A clone shares everything until one of both changes.
 #[derive(Clone, Debug)]
 pub(super) struct SpatialIndex {
     cell_edge_m: f64,
-    /// 2^bits of them; each is sorted by tag and place, so the places of one cell lie side by side.
+    /// 2^bits of them.
     shards: Arc<Vec<Shard>>,
     shard_bits: u32,
     places: usize,
+    /// Least and largest coordinates of all positions so far: none lies farther out, whatever was
+    /// removed.
+    bounds: [[f64; 3]; 2],
 }
 
 impl SpatialIndex {
@@ -51,15 +63,20 @@ impl SpatialIndex {
     pub(super) fn new(cell_edge_m: f64) -> Self {
         Self {
             cell_edge_m,
-            shards: Arc::new(vec![Arc::default(); 1 << SHARD_BITS_MIN]),
+            shards: Arc::new(vec![Shard::default(); 1 << SHARD_BITS_MIN]),
             shard_bits: SHARD_BITS_MIN,
             places: 0,
+            bounds: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
         }
     }
 
     /// Adds a place.
     pub(super) fn insert(&mut self, place: PlaceId, position: &Point3<f64>) {
         self.places += 1;
+        for (axis, x) in position.iter().enumerate() {
+            self.bounds[0][axis] = self.bounds[0][axis].min(*x);
+            self.bounds[1][axis] = self.bounds[1][axis].max(*x);
+        }
         if self.shard_bits < SHARD_BITS_MAX
             && self.places >= PLACES_PER_SHARD << (self.shard_bits + SHARD_BITS_STEP)
         {
@@ -67,24 +84,28 @@ impl SpatialIndex {
         }
         let (shard, tag) = self.slot(self.cell(position.coords.into()));
         let shard = &mut Arc::make_mut(&mut self.shards)[shard];
-        let shard = Arc::make_mut(shard);
-        let slot = shard.partition_point(|entry| (entry.tag, entry.place) < (tag, place));
+        shard.occupy(tag, self.shard_bits);
+        let (before, after) = shard.entries.split_at(
+            { &shard.entries }.partition_point(|entry| (entry.tag, entry.place) < (tag, place)),
+        );
         let near = rounded(position);
-        shard.insert(slot, Entry { tag, place, near });
+        shard.entries = [before, &[Entry { tag, place, near }], after]
+            .concat()
+            .into();
     }
 
     /// Removes a place that was added at this position.
     pub(super) fn remove(&mut self, place: PlaceId, position: &Point3<f64>) {
         let (shard, tag) = self.slot(self.cell(position.coords.into()));
-        let slot = self.shards[shard]
+        let slot = { &self.shards[shard].entries }
             .binary_search_by_key(&(tag, place), |entry| (entry.tag, entry.place));
         let Ok(slot) = slot else { return };
         self.places -= 1;
-        let shard = Arc::make_mut(&mut Arc::make_mut(&mut self.shards)[shard]);
-        shard.remove(slot);
-        if shard.len() * 2 <= shard.capacity() {
-            shard.shrink_to_fit();
-        }
+        let shard = &mut Arc::make_mut(&mut self.shards)[shard];
+        shard.entries = [&shard.entries[..slot], &shard.entries[slot + 1..]]
+            .concat()
+            .into();
+        shard.know_occupied(self.shard_bits);
     }
 
     /// Splits every shard into eight. That happens twice in the life of an index, while it is
@@ -92,19 +113,26 @@ impl SpatialIndex {
     fn split(&mut self) {
         self.shard_bits += SHARD_BITS_STEP;
         let mut shards = vec![Vec::new(); 1 << self.shard_bits];
-        for entry in self.shards.iter().flat_map(|shard| shard.iter()) {
+        for entry in self.shards.iter().flat_map(|shard| shard.entries.iter()) {
             // Shards follow the upper bits of the tag, so the order of the entries stays.
             shards[self.shard_of(entry.tag)].push(*entry);
         }
-        let shards = shards.into_iter().map(Arc::new);
+        let shards = shards.into_iter().map(|entries| {
+            let mut shard = Shard {
+                entries: entries.into(),
+                ..Shard::default()
+            };
+            shard.know_occupied(self.shard_bits);
+            shard
+        });
         self.shards = Arc::new(shards.collect());
     }
 
     /// Bytes of memory that it takes, reserved ones included.
     pub(super) fn bytes(&self) -> usize {
         let shards = self.shards.iter();
-        let entries: usize = shards.map(|shard| shard.capacity()).sum();
-        let shard = size_of::<Shard>() + size_of::<Vec<Entry>>() + 2 * size_of::<usize>();
+        let entries: usize = shards.map(|shard| shard.entries.len()).sum();
+        let shard = size_of::<Shard>() + 2 * size_of::<usize>();
         entries * size_of::<Entry>() + self.shards.len() * shard
     }
 
@@ -129,6 +157,9 @@ impl SpatialIndex {
         limit: f64,
         mut visit: impl FnMut(PlaceId) -> f64,
     ) -> bool {
+        if self.is_outside(point, limit.sqrt()) {
+            return true;
+        }
         let Some((low, high)) = self.range(point, limit.sqrt()) else {
             return false;
         };
@@ -185,18 +216,29 @@ impl SpatialIndex {
         true
     }
 
+    /// Whether all places are farther from a point than `radius_m`: above and below a floor most
+    /// points are. Distances are rounded by less than what is added.
+    fn is_outside(&self, point: &Point3<f64>, radius_m: f64) -> bool {
+        let [low, high] = &self.bounds;
+        (0..3).any(|axis| {
+            let outside_m = (low[axis] - point[axis]).max(point[axis] - high[axis]);
+            outside_m > radius_m * (1.0 + 1e-9)
+        })
+    }
+
     /// The entries of a cell, and perhaps those of another one that has the same tag.
     fn entries(&self, cell: Cell) -> &[Entry] {
         self.tagged(tag(cell), 0)
     }
 
     /// The entries that have a tag but for so many of its lowest bits, which are 0 in `tag`.
+    #[inline]
     fn tagged(&self, tag: u32, open_bits: u32) -> &[Entry] {
         let shard = &self.shards[self.shard_of(tag)];
-        let rest = &shard[first_of(shard, tag, self.shard_bits)..];
-        let is_beyond = |entry: &Entry| entry.tag >> open_bits != tag >> open_bits;
-        let end = rest.iter().position(is_beyond);
-        &rest[..end.unwrap_or(rest.len())]
+        if !shard.is_occupied(tag, self.shard_bits) {
+            return &[];
+        }
+        shard.tagged(tag, open_bits, self.shard_bits)
     }
 
     /// The shard of a cell, and its tag there.
@@ -213,8 +255,51 @@ impl SpatialIndex {
     /// The cell of a position. Positions beyond 2⁶³ cells share the outermost ones.
     #[expect(clippy::cast_possible_truncation, reason = "saturates, as documented")]
     fn cell(&self, position: [f64; 3]) -> Cell {
-        position.map(|x| (x / self.cell_edge_m).floor() as i64)
+        position.map(|x| {
+            // Rounded down by hand: `floor` is a call where the processor's own is not assumed.
+            let x = x / self.cell_edge_m;
+            let whole = x as i64;
+            whole.saturating_sub(i64::from(whole as f64 > x))
+        })
     }
+}
+
+impl Shard {
+    /// Whether the block of a tag may hold a place; `shard_bits` of it are those of the shard.
+    fn is_occupied(&self, tag: u32, shard_bits: u32) -> bool {
+        let (word, bit) = class_of(tag, shard_bits);
+        self.occupied[word] & bit != 0
+    }
+
+    /// The entries that have a tag but for so many of its lowest bits.
+    fn tagged(&self, tag: u32, open_bits: u32, shard_bits: u32) -> &[Entry] {
+        let rest = &self.entries[first_of(&self.entries, tag, shard_bits)..];
+        let is_beyond = |entry: &Entry| entry.tag >> open_bits != tag >> open_bits;
+        let end = rest.iter().position(is_beyond);
+        &rest[..end.unwrap_or(rest.len())]
+    }
+
+    /// The block of a tag holds a place.
+    fn occupy(&mut self, tag: u32, shard_bits: u32) {
+        let (word, bit) = class_of(tag, shard_bits);
+        self.occupied[word] |= bit;
+    }
+
+    /// Finds out anew which blocks hold a place.
+    fn know_occupied(&mut self, shard_bits: u32) {
+        self.occupied = [0; OCCUPIED_WORDS];
+        for entry in self.entries.iter() {
+            let (word, bit) = class_of(entry.tag, shard_bits);
+            self.occupied[word] |= bit;
+        }
+    }
+}
+
+/// The bit for the block of a tag, with its word: the upper bits that are not those of the shard.
+fn class_of(tag: u32, shard_bits: u32) -> (usize, u64) {
+    const BITS: u32 = OCCUPIED_WORDS.ilog2() + u64::BITS.ilog2();
+    let class = (tag << shard_bits) >> (u32::BITS - BITS);
+    ((class / u64::BITS) as usize, 1 << (class % u64::BITS))
 }
 
 /// Lower bound of the squared distance along one axis from a coordinate to anything in the cells or
