@@ -159,7 +159,8 @@ impl PerceptLikelihood<'_> {
                 },
                 None,
             ) => {
-                // Loops, since closures of arrays are not compiled for the widest vectors.
+                // Loops, since closures given to `array::map` and `from_fn` are not compiled for
+                // the widest vectors.
                 let (mut levels, mut variances) = ([0.0; LANES], [0.0; LANES]);
                 for (k, number) in numbers.iter().enumerate() {
                     let own = &packed[*number as usize];
@@ -197,11 +198,14 @@ impl PerceptLikelihood<'_> {
                 noise,
                 scale,
             } => {
+                let all = &mut out[..];
                 Arch::new().dispatch(
                     #[inline(always)]
-                    || {
+                    move || {
+                        // Given away, so that it is inlined: see `Shortlist::choose`.
+                        let all = all;
                         for ((likelihood, level), variance) in
-                            out.iter_mut().zip(levels).zip(variances)
+                            all.iter_mut().zip(levels).zip(variances)
                         {
                             *likelihood = level_likelihood(value - level, variance + noise, scale);
                         }
@@ -217,7 +221,9 @@ impl PerceptLikelihood<'_> {
         if let Some(normal_percept) = &self.normal_percept {
             Arch::new().dispatch(
                 #[inline(always)]
-                || {
+                move || {
+                    // Given away, so that it is inlined: see `Shortlist::choose`.
+                    let out = out;
                     for (likelihood, normal) in out.iter_mut().zip(normals) {
                         *likelihood *= normal_percept.likelihood(normal);
                     }

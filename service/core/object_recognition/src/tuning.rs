@@ -208,6 +208,9 @@ pub(crate) const GATE_SQUARED: f64 = 32.0;
 /// Distance from a search within which others share its list of places, per reach. Chosen by
 /// running time.
 pub(crate) const SHORTLIST_SLACK: f64 = 0.5;
+/// Radius of a list of places, per reach of a search that shares it, at most: a narrow search would
+/// look at too many places of a wide list. At least 1 + `SHORTLIST_SLACK`. Chosen.
+pub(crate) const SHORTLIST_WIDEST: f64 = 2.5;
 
 // Translations: the prefilter.
 

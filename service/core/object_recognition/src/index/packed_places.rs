@@ -13,8 +13,7 @@ use crate::tuning::{
     GATE_SQUARED, NEAREST_CELLS_PER_REACH, NEAREST_GROWTH, NEAREST_MARGIN, NEAREST_SD,
 };
 
-/// Error of a distance in single precision, per the lengths that it is computed of: several times
-/// that of a number.
+/// Relative error of a distance computed in single precision: several roundings.
 const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
 
 /// A place with what most places have: a position and one level.
@@ -172,7 +171,8 @@ impl PackedPlaces {
         (GATE_SQUARED * widest_m2).sqrt()
     }
 
-    /// The same, with room for whatever single precision finds within the gate.
+    /// `reach_m`, and what rounding to single precision may add to it: no place outside passes the
+    /// gate in single precision.
     pub(crate) fn rounded_reach_m(&self, variance_m2: f64) -> f64 {
         (1.0 + ROUNDING) * self.reach_m(variance_m2) + self.rounding_m
     }

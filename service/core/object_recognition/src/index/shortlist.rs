@@ -5,7 +5,7 @@ use pulp::Arch;
 
 use crate::index::packed_places::PackedPlaces;
 use crate::numeric::to_f32;
-use crate::tuning::{GATE_SQUARED, SHORTLIST_SLACK};
+use crate::tuning::{GATE_SQUARED, SHORTLIST_SLACK, SHORTLIST_WIDEST};
 
 /// Places that are compared at once.
 const LANES: usize = 8;
@@ -32,14 +32,14 @@ struct Block {
 
 /// Places about a point, and those of them that were found last.
 ///
-/// Hypotheses of one model mostly predict a touch where the one before did. So a search that finds
-/// no list for its point makes one of all places a little farther around, in which the next ones
-/// are done without the index. What is found does not depend on the searches before.
+/// Hypotheses of one model mostly predict a touch near one another. So the places about one
+/// prediction are listed once, and the next predictions search that list. What is found does not
+/// depend on the searches before.
 #[derive(Debug, Default)]
 pub(crate) struct Shortlist {
     arch: Arch,
-    /// Ball whose places are all listed, but for wide ones, which all are; none before the first
-    /// search in a model.
+    /// Every place in this ball is listed, and every wide place wherever it is. None before the
+    /// first search in a model.
     ball: Option<(Point3<f64>, f64)>,
     /// Whether the next search is expected to have others beside it.
     has_slack: bool,
@@ -59,12 +59,15 @@ impl Shortlist {
     }
 
     /// Finds the places that a point with this variance per axis \[m²\] could be of, in the order
-    /// of their numbers, then the wide ones.
+    /// of their numbers, then the wide ones. Before the first search in another model,
+    /// [`begin`](Self::begin) must come.
     pub(crate) fn find(&mut self, packed: &PackedPlaces, point: &Point3<f64>, variance_m2: f64) {
         let reach_m = packed.rounded_reach_m(variance_m2);
         let apart_m = self.ball.map(|(middle, _)| (point - middle).norm());
         let is_listed = { self.ball.zip(apart_m) }
-            .is_some_and(|((_, radius_m), apart_m)| apart_m + reach_m <= radius_m);
+            .is_some_and(|((_, radius_m), apart_m)| {
+                apart_m + reach_m <= radius_m && radius_m <= SHORTLIST_WIDEST * reach_m
+            });
         if !is_listed {
             let slack_m = SHORTLIST_SLACK * reach_m;
             // What lies apart from the search before does so from the next one, mostly.
@@ -105,7 +108,8 @@ impl Shortlist {
             numbers.retain(|number| !is_wide(number));
             numbers.extend(&wide.numbers);
         }
-        // Unused lanes are too far off to be found.
+        // Unused lanes hold NaN, which no comparison finds: `choose` must ask `<=`, not the
+        // negation of `>`.
         let unused = Block {
             axes: [[f32::NAN; LANES]; 3],
             variances: [0.0; LANES],
@@ -138,8 +142,8 @@ impl Shortlist {
         arch.dispatch(
             #[inline(always)]
             move || {
-                // A closure that gives away what it holds can be called once only: others have a
-                // function of their own that calls them, which is compiled for narrow vectors.
+                // Moving `found` makes this closure `FnOnce`, so that it is inlined. An `FnMut` is
+                // called through a function that is not compiled for wide vectors.
                 let found = found;
                 for (block, first) in blocks.iter().zip((0_u32..).step_by(LANES)) {
                     let [x, y, z] = &block.axes;
@@ -182,15 +186,27 @@ mod tests {
 
     #[test]
     fn what_is_found_is_all_within_the_gate_whatever_was_searched_before() {
+        search_one_after_another(|_| 0.001, 0);
+    }
+
+    #[test]
+    fn wide_places_are_found_once_and_after_the_others() {
+        search_one_after_another(|k| if k % 100 == 0 { 0.02 } else { 0.001 }, 10);
+    }
+
+    /// Searches a model of places that are known so well \[m\], of which so many at least are wide.
+    fn search_one_after_another(sd_m: impl Fn(u64) -> f64, wide_min: usize) {
         let noise = |k: u64| random::uniform(13, [0, 0, k]) * 0.1 - 0.05;
         let point = |k: u64| Point3::new(noise(3 * k), noise(3 * k + 1), 0.2 * noise(3 * k + 2));
         let mut model = ObjectModel::new(ModelSettings::default());
         for k in 0..2000 {
-            model.learn(&Contact::at(point(k), 0.001));
+            model.learn(&Contact::at(point(k), sd_m(k)));
         }
         let packed = IndexedModel::new(&model).packed;
+        let wide = &packed.wide.numbers;
+        assert!(wide.len() >= wide_min, "{}", wide.len());
         let mut shortlist = Shortlist::default();
-        let mut found = 0;
+        let (mut found, mut found_wide, mut reused, mut too_wide) = (0, 0, 0, 0);
         for (k, step_m) in (0..4000).zip([0.0, 0.001, 0.004, 0.03].into_iter().cycle()) {
             if k % 50 == 0 {
                 shortlist.begin(k % 100 == 0);
@@ -198,22 +214,41 @@ mod tests {
             // Walks in small and in large steps.
             let query = point(5000 + k / 20) + point(9000 + k).coords * (20.0 * step_m);
             let variance_m2 = [1e-7, 1e-6, 2e-6, 3e-5][(k / 7 % 4) as usize];
+            let before = shortlist.ball;
             shortlist.find(&packed, &query, variance_m2);
+            let reach_m = packed.rounded_reach_m(variance_m2);
+            let is_inside = before
+                .is_some_and(|(middle, radius_m)| (query - middle).norm() + reach_m <= radius_m);
+            reused += usize::from(shortlist.ball == before);
+            too_wide += usize::from(is_inside && shortlist.ball != before);
+            let mut listed = shortlist.numbers.clone();
+            listed.sort_unstable();
+            assert!(listed.is_sorted_by(|a, b| a < b), "listed twice: {k}");
             let at = (query - packed.middle).map(to_f32);
-            let is_near = |number: &usize| {
-                let own = &packed.all[*number];
+            let is_near = |number: &u32| {
+                let own = &packed.all[*number as usize];
                 let apart = Vector3::from(own.at) - at;
                 let gate = to_f32(GATE_SQUARED) * (to_f32(variance_m2) + own.variance_m2);
                 apart.x * apart.x + apart.y * apart.y + apart.z * apart.z <= gate
             };
-            let expected: Vec<usize> = (0..packed.all.len()).filter(is_near).collect();
-            let mut numbers: Vec<usize> = { shortlist.found().iter() }
-                .map(|near| near.number as usize)
+            let near = (0_u32..).take(packed.all.len()).filter(is_near);
+            let (last, mut expected): (Vec<u32>, Vec<u32>) =
+                near.partition(|number| wide.contains(number));
+            found_wide += last.len();
+            expected.extend(last);
+            let numbers: Vec<u32> = { shortlist.found().iter() }
+                .map(|near| near.number)
                 .collect();
-            numbers.sort_unstable();
             assert_eq!(numbers, expected, "{k}");
+            for near in shortlist.found() {
+                let own = &packed.all[near.number as usize];
+                assert_eq!(shortlist.apart(near), Vector3::from(own.at) - at, "{k}");
+            }
             found += numbers.len();
         }
         assert!(found > 4000, "{found}");
+        assert!(found_wide >= wide_min, "{found_wide}");
+        assert!(reused > 400, "{reused}");
+        assert!(too_wide > 10, "{too_wide}");
     }
 }

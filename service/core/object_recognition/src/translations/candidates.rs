@@ -36,7 +36,8 @@ impl CandidateSearch {
     }
 
     /// Finds the places that a touch predicted at `point`, with this variance per axis \[m²\],
-    /// could be of, and returns the sum of their densities.
+    /// could be of, and returns the sum of their densities. Before the first search in another
+    /// model, [`begin`](Self::begin) must come.
     pub(crate) fn find(
         &mut self,
         packed: &PackedPlaces,
@@ -60,6 +61,7 @@ impl CandidateSearch {
         (least, noise_m2): (f64, f64),
         candidates: &mut Vec<Candidate>,
     ) {
+        debug_assert_eq!(self.shortlist.found().len(), self.densities.len());
         candidates.clear();
         for (near, density) in self.shortlist.found().iter().zip(&self.densities) {
             if *density >= least {

@@ -23,7 +23,7 @@ pub(crate) struct SplitBuffers {
 }
 
 impl SplitBuffers {
-    /// The hypotheses that follow are of another model.
+    /// So many hypotheses of one model, rotation and touch follow.
     fn begin(&mut self, hypotheses: usize) {
         self.search.begin(hypotheses > 1);
     }
