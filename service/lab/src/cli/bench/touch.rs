@@ -25,7 +25,7 @@ const TOUCHES: usize = 12;
 /// Touches by which a place is learned.
 const TOUCHES_PER_PLACE: usize = 5;
 /// Runs of the same episode, of which the least time counts, so that other programs on the machine
-/// do so little.
+/// disturb it little.
 const RUNS: usize = 3;
 const SEED: u64 = 1;
 const NOISE: ExplorationNoise = ExplorationNoise {
@@ -37,7 +37,8 @@ const NOISE: ExplorationNoise = ExplorationNoise {
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(in crate::cli) struct TouchArgs {
     /// Numbers of objects.
-    #[arg(long, value_delimiter = ',', default_values_t = [10, 30, 100, 300])]
+    #[arg(long, value_delimiter = ',', default_values_t = [10, 30, 100, 300],
+        value_parser = clap::value_parser!(u32).range(1..))]
     objects: Vec<u32>,
     /// Objects feel of nothing; otherwise each place has a level, felt with 10 % of noise.
     #[arg(long)]

@@ -9,7 +9,7 @@ use cognitive_map::{
     SampleBody, Settings, Spacing, Touch, TouchLevel, TouchNoise,
 };
 use nalgebra::{Point3, Vector3};
-use object_recognition::Orientation;
+use object_recognition::{Orientation, Verdict};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -24,7 +24,7 @@ const EPISODES: u32 = 24;
 /// Touches of each.
 const TOUCHES: usize = 30;
 /// Runs of the same episode, of which the least time counts, so that other programs on the machine
-/// do so little.
+/// disturb it little.
 const RUNS: usize = 3;
 /// Ranges of touches that are told apart, by the first and the last of each.
 const RANGES: [(usize, usize); 4] = [(1, 1), (2, 5), (6, TOUCHES), (1, TOUCHES)];
@@ -45,7 +45,7 @@ struct Report {
     rows: Vec<Row>,
 }
 
-/// Times of the records of touches, with what an episode answers to each.
+/// Time to apply the record of a touch, the episode's answer included.
 #[derive(Debug, Serialize)]
 struct Row {
     objects: u32,
@@ -57,6 +57,28 @@ struct Row {
     ms_max: f64,
     /// Median of the yardstick: the distance from the contact to every place of all objects.
     scan_ms_p50: f64,
+    #[serde(flatten)]
+    answers: Answers,
+}
+
+/// What episodes say after their last touch.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+struct Answers {
+    /// Episodes on taught objects.
+    taught: u32,
+    /// Those of them in which the object is recognised.
+    recognised: u32,
+    /// Episodes on strangers.
+    strangers: u32,
+    /// Those of them in which the object is unknown.
+    unknown: u32,
+}
+
+/// What happens in an episode.
+struct Exploration {
+    /// Number of the object, if it was taught.
+    taught: Option<usize>,
+    touches: Vec<Level>,
 }
 
 /// Objects that a map was taught, and strangers.
@@ -73,6 +95,11 @@ pub(super) fn run(objects: &[u32], orientation: &Orientation, json: bool) -> any
     for &count in objects {
         output::progress(&format!("teaching {count} objects"));
         let taught = Taught::new(count)?;
+        let known = taught.map.object_count();
+        anyhow::ensure!(
+            known == taught.objects.len(),
+            "the map has {known} objects after {count} were taught"
+        );
         rows.extend(taught.rows(count, orientation)?);
     }
     if json {
@@ -90,6 +117,18 @@ pub(super) fn run(objects: &[u32], orientation: &Orientation, json: bool) -> any
             row.ms_max,
             row.scan_ms_p50
         ))?;
+        if row.last_touch == TOUCHES && row.first_touch == 1 {
+            let Answers {
+                taught,
+                recognised,
+                strangers,
+                unknown,
+            } = row.answers;
+            output::line(&format!(
+                "        recognised in {recognised} of {taught} episodes, unknown in {unknown} of \
+                 {strangers} with strangers"
+            ))?;
+        }
     }
     Ok(())
 }
@@ -106,7 +145,7 @@ impl Taught {
         for (number, object) in (0..count).zip(&objects) {
             let record = Record::TeachObject {
                 number: number.into(),
-                name: Label::new(&format!("object-{number}"))?,
+                name: Label::new(&object_name(number as usize))?,
                 lesson: lesson(object, number)?,
             };
             map.apply(&record, &mut events);
@@ -125,11 +164,16 @@ impl Taught {
     fn rows(&self, count: u32, orientation: &Orientation) -> Result<Vec<Row>, InvalidSample> {
         let mut times = vec![Vec::new(); TOUCHES];
         let mut scans = Vec::new();
+        let mut answers = Answers::default();
         for episode in 0..EPISODES {
             output::progress(&format!("episode {} of {EPISODES}", episode + 1));
-            let samples = self.episode(episode)?;
+            let Exploration {
+                taught,
+                touches: samples,
+            } = self.episode(episode)?;
             let mut least = [f64::INFINITY; TOUCHES];
-            for _ in 0..RUNS {
+            let mut least_scans = [f64::INFINITY; TOUCHES];
+            for run in 0..RUNS {
                 // A copy that shares no episode with another one.
                 let mut map = self.map.clone();
                 let mut hand = Hand::default();
@@ -138,8 +182,14 @@ impl Taught {
                     let ms = hand.send(&mut map, SampleBody::Level(sample.clone()));
                     *least = least.min(ms);
                 }
-                scans.extend(samples.iter().map(|sample| self.scan_ms(sample)));
+                for (sample, least) in samples.iter().zip(&mut least_scans) {
+                    *least = least.min(self.scan_ms(sample));
+                }
+                if run == 0 {
+                    answers.count(&map, taught);
+                }
             }
+            scans.extend(least_scans);
             for (times, least) in times.iter_mut().zip(least) {
                 times.push(least);
             }
@@ -156,13 +206,14 @@ impl Taught {
                 ms_p99: quantile(&mut own, 0.99),
                 ms_max: quantile(&mut own, 1.0),
                 scan_ms_p50,
+                answers,
             }
         });
         Ok(rows.into())
     }
 
-    /// The touches of an episode, in a frame that begins at the first one.
-    fn episode(&self, episode: u32) -> Result<Vec<Level>, InvalidSample> {
+    /// An episode, with its touches in a frame that begins at the first one.
+    fn episode(&self, episode: u32) -> Result<Exploration, InvalidSample> {
         let mut random = ChaCha8Rng::seed_from_u64(SEED);
         random.set_stream(EXPLORING + u64::from(episode));
         let (is_walk, is_taught) = (episode.is_multiple_of(2), episode % 4 < 2);
@@ -171,19 +222,21 @@ impl Taught {
         } else {
             &self.strangers
         };
-        let object = &all[random.random_range(0..all.len())];
+        let number = random.random_range(0..all.len());
+        let object = &all[number];
         let mut touches = Vec::with_capacity(TOUCHES);
         if is_walk {
             let noise = ExplorationNoise {
                 value: LEVEL_SD,
                 motion: 0.0,
             };
-            let mut explorer = Explorer::new(object, noise, random.clone());
+            let mut explorer = Explorer::new(object, noise, random);
             for _ in 0..TOUCHES {
                 let felt = explorer.feel();
                 touches.push((felt.position_m, felt.level));
                 explorer.advance();
             }
+            random = explorer.into_random();
         } else {
             let mut face = || &object.faces()[random.random_range(0..object.faces().len())];
             let first_m = face().position_m;
@@ -201,7 +254,10 @@ impl Taught {
             let offset_m = position_m + POSITION_SD_M * error;
             Level::new(Label::new(CHANNEL)?, level, offset_m.into(), None)
         });
-        noisy.collect()
+        Ok(Exploration {
+            taught: is_taught.then_some(number),
+            touches: noisy.collect::<Result<_, _>>()?,
+        })
     }
 
     /// Milliseconds for the distance from a contact to every place.
@@ -215,6 +271,28 @@ impl Taught {
         std::hint::black_box(squares.fold(f32::INFINITY, f32::min));
         begin.elapsed().as_secs_f64() * 1e3
     }
+}
+
+impl Answers {
+    /// Counts what the hand's episode in `map` says, of a taught object or of a stranger.
+    fn count(&mut self, map: &CognitiveMap, taught: Option<usize>) {
+        let verdict = map.episode(HAND).map(|(_, own)| own.posterior.verdict());
+        let Some(number) = taught else {
+            self.strangers += 1;
+            self.unknown += u32::from(verdict == Some(Verdict::Unknown));
+            return;
+        };
+        self.taught += 1;
+        let name = object_name(number);
+        let is_recognised = map.objects().any(|(id, known, _)| {
+            known.name().as_str() == name && verdict == Some(Verdict::Object(id))
+        });
+        self.recognised += u32::from(is_recognised);
+    }
+}
+
+fn object_name(number: usize) -> String {
+    format!("object-{number}")
 }
 
 /// A contact with each face of an object.
