@@ -47,7 +47,8 @@ class NoiseSettings:
     #: Of the lasting relative error of angles, e.g. of a wheel base. 0.3 of it is that of the turn
     #: with each metre [rad/m], e.g. by wheels of different sizes.
     angle_error_sd: float = 0.1
-    #: Of the lasting bias about each axis, e.g. of a gyroscope [rad/s].
+    #: Of the lasting bias about each axis, e.g. of a gyroscope [rad/s]. A robot that stands, and
+    #: turns by its odometry more slowly than three of it, reads it.
     bias_sd_rad_s: float = 0.004
 
 

@@ -19,6 +19,7 @@
 
 mod data_set;
 mod error;
+mod reflections;
 mod row;
 mod samples;
 mod views;

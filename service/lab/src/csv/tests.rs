@@ -3,7 +3,7 @@
 use cogmap_proto::{Relation, SampleBody, Target};
 use nalgebra::Vector3;
 
-use super::{Choice, TableError, TableReason, TableSet, Views};
+use super::{Choice, Row, RowBody, TableError, TableReason, TableSet, Views};
 
 const SAMPLES: &str = "\
 t_s,agent,kind,f1,f2,f3,f4,f5,f6,f7
@@ -132,4 +132,33 @@ fn a_view_that_is_not_there_is_an_error() {
     short.pop();
     assert_eq!(Views::read(&short), None);
     assert_eq!(Views::read(b"not a matrix"), None);
+}
+
+#[test]
+fn a_share_of_the_distances_is_reflected() {
+    let text: String = (0..200)
+        .map(|k| format!("{k},a,sighting,landmark,mast,range,7.5,0.1\n"))
+        .collect();
+    let set = TableSet::read(&format!("t_s\n{text}"), "").unwrap();
+    let n_reflected = |share: f64, seed: u64| {
+        let mut set = set.clone();
+        set.reflect(share, seed);
+        let is_reflected = |row: &&Row| match &row.body {
+            RowBody::Range(_, range_m, _) => {
+                assert!([7.5, 22.5].iter().any(|one| (one - range_m).abs() < 1e-9));
+                *range_m > 10.0
+            }
+            other => panic!("{other:?}"),
+        };
+        set.agents["a"].rows.iter().filter(is_reflected).count()
+    };
+    assert_eq!(n_reflected(0.0, 1), 0);
+    assert!((40..80).contains(&n_reflected(0.3, 1)));
+    let drawn = |seed: u64| {
+        let mut set = set.clone();
+        set.reflect(0.3, seed);
+        set
+    };
+    assert_eq!(drawn(1), drawn(1));
+    assert_ne!(drawn(1), drawn(2));
 }

@@ -92,7 +92,7 @@ impl AgentFilter {
             .fixed_view_mut::<6, 6>(0, 0)
             .copy_from(covariance);
         let mut sd = parameters.calibration_sd();
-        sd[VEER] = 0.0; // until a landmark is seen: see `begin_veer`
+        sd[VEER] = 0.0; // until a landmark is seen with its direction: see `begin_veer`
         for (k, sd) in sd.iter().enumerate() {
             filter.at_run_start[(POSE + k, POSE + k)] = sd * sd;
         }
@@ -177,7 +177,9 @@ impl AgentFilter {
     ) -> Step {
         let reading = OdometryReading::new(motion, duration_s);
         self.is_planar &= reading.is_planar();
-        let measured_bias = self.standing.take_in(&reading, parameters.bias_sd_rad_s);
+        let measured_bias = self
+            .standing
+            .take_in(&reading, duration_s, parameters.bias_sd_rad_s);
         let increment = reading.corrected_by(&self.calibration);
         let variance = self.learned_variance(motion, &increment, parameters);
         self.run.append(&reading, &increment, &variance);

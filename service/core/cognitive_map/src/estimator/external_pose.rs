@@ -75,7 +75,7 @@ impl Estimator {
 
     /// Alters an agent in its frame, or by itself where it is detached; answers what `alter` does,
     /// with `false` meaning that nothing has changed.
-    pub(super) fn alter(
+    fn alter(
         &mut self,
         agent: u32,
         effects: &mut Vec<Effect>,

@@ -12,7 +12,8 @@ use crate::input::Motion;
 impl Estimator {
     /// An agent moved.
     ///
-    /// Costs the same however much is known.
+    /// Costs the same however much is known, but for the one that ends a stand, which costs as much
+    /// as a sighting.
     pub fn motion(
         &mut self,
         agent: u32,
@@ -43,12 +44,10 @@ impl Estimator {
         ranging.go(&step.increment, &step.variance);
         filter.history.advance(stamp_ns, motion.increment());
         effects.push(Effect::Moved { agent, step });
-        let is_nowhere = filter.is_nowhere();
-        if let Some(measured) = &step.measured_bias {
-            self.learn_bias(agent, measured, effects);
-        }
-        if is_nowhere {
+        if filter.is_nowhere() {
             self.set_aside(agent, effects);
+        } else if let Some(measured) = &step.measured_bias {
+            self.learn_bias(agent, measured, effects);
         }
         if !self.pending.is_empty() {
             self.take_in_pending(effects);

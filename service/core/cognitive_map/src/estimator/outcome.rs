@@ -38,6 +38,12 @@ pub struct Step {
 }
 
 impl Step {
+    /// Whether the odometry is corrected otherwise from the next motion on, for what it read while
+    /// the body stood.
+    pub(crate) fn ends_stand(&self) -> bool {
+        self.measured_bias.is_some()
+    }
+
     /// Of an agent that is not known.
     pub(super) fn none() -> Self {
         Self {

@@ -10,6 +10,7 @@ use super::agent_slot::{AgentState, Detached};
 use super::effect::Effect;
 use super::frame_alignment::FrameAlignment;
 use super::joint::{Estimator, MAP};
+use super::standing::Standing;
 use super::tuning::ANY_TURN_SD_RAD;
 use crate::input::StartPose;
 use geometry::{OUT_OF_PLANE, PoseCovariance, is_somewhere, positive, se3};
@@ -119,6 +120,7 @@ impl Estimator {
         let widen = |state: &mut AgentState| {
             state.filter.history.clear();
             state.filter.noise.forget_anchors();
+            state.filter.standing = Standing::default();
             state.ranging.clear();
             let covariance = state.filter.covariance_mut();
             for k in 0..6 {

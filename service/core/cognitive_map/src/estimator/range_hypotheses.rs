@@ -44,6 +44,8 @@ pub(super) struct RangeHypotheses {
     pub(super) outlying: u32,
     /// Log of the density of these, by all places together.
     pub(super) log_evidence: f64,
+    /// How far off the landmark is at most, for distances are never too short \[m\].
+    pub(super) at_most_m: f64,
 }
 
 /// Where a landmark is, in the body frame.
@@ -113,6 +115,7 @@ impl RangeHypotheses {
             taken: 0,
             outlying: 0,
             log_evidence: 0.0,
+            at_most_m: range.range_m() + 3.0 * variance.sqrt(),
         }
     }
 
@@ -126,7 +129,10 @@ impl RangeHypotheses {
         }
         self.log_evidence += self.prune();
         self.taken += 1;
-        self.suppose_reflections(range, variance, is_planar);
+        if !self.points.is_empty() {
+            self.suppose_reflections(range, variance, is_planar);
+        }
+        self.at_most_m = self.at_most_m.min(range.range_m() + 3.0 * variance.sqrt());
         self.outlying += u32::from(least > RANGE_OUTLYING_SQUARE);
         if self.taken >= RANGE_TRIAL_MIN && 2 * self.outlying > self.taken || self.points.is_empty()
         {
@@ -137,33 +143,40 @@ impl RangeHypotheses {
     }
 
     /// All distances before this one may have been those of reflections: adds the places where the
-    /// landmark may be by this one alone, as far as that is probable beside the others.
+    /// landmark may be by this one alone, as far as that is probable beside the others. None of
+    /// them may have been shorter than reflections are.
     fn suppose_reflections(&mut self, range: &Range, variance: f64, is_planar: bool) {
-        let mut added = places(range, variance, is_planar);
         let log_density = (RANGE_REFLECTED / RANGE_REFLECTION_MAX_M).ln();
-        let log_weight =
-            f64::from(self.taken) * log_density - self.log_evidence - (added.len() as f64).ln();
-        if log_weight <= RANGE_WEIGHT_MIN.ln() {
+        let log_mass = f64::from(self.taken) * log_density - self.log_evidence;
+        let least = RANGE_WEIGHT_MIN.ln();
+        if log_mass <= least || range.range_m() > self.at_most_m + 3.0 * variance.sqrt() {
+            return;
+        }
+        let mut added = places(range, variance, is_planar);
+        let room = RANGE_POINTS_MAX.saturating_sub(added.len());
+        if added[0].log_weight + log_mass <= least || (self.points.len() > room && log_mass < 0.0) {
             return;
         }
         for point in &mut added {
-            point.log_weight = log_weight;
+            point.log_weight += log_mass;
+        }
+        let more = |one: &PointHypothesis, other: &PointHypothesis| {
+            other.log_weight.total_cmp(&one.log_weight)
+        };
+        if self.points.len() > room {
+            self.points.sort_by(more);
+            self.points.truncate(room);
         }
         self.points.append(&mut added);
-        if self.points.len() > RANGE_POINTS_MAX {
-            let more = |one: &PointHypothesis, other: &PointHypothesis| {
-                other.log_weight.total_cmp(&one.log_weight)
-            };
-            self.points.sort_by(more);
-            self.points.truncate(RANGE_POINTS_MAX);
-        }
         self.log_evidence += self.normalise();
     }
 
     /// Moves the places to the body frame as it is now.
     fn carry_over_motion(&mut self) {
         let motion = std::mem::take(&mut self.motion);
-        self.path_m += motion.motion().translation.vector.norm();
+        let path_m = motion.motion().translation.vector.norm();
+        self.path_m += path_m;
+        self.at_most_m += path_m;
         let back = motion.motion().inverse();
         let turn = back.rotation.to_rotation_matrix().into_inner();
         let noise = *motion.covariance().matrix();

@@ -189,8 +189,12 @@ impl Frame {
         member
             .range_sensor
             .note(seen, stamp_ns, sd_m, residual[0], spread);
+        // With the gain that a distance has which is direct with this probability, and else says
+        // nothing.
         let direct = RangeDensity::new(residual[0], spread + variance).direct_share();
-        let weighted = (variance + curved) * loss_of_weight(square) / direct;
+        let known = projection.spread[(0, 0)];
+        let total = known + (variance + curved) * loss_of_weight(square);
+        let weighted = total / direct - known;
         let weighted = Vector1::new(weighted);
         self.take_in(measurement, projection, &residual, &weighted, scope);
         outcome.verdict = Verdict::Accepted {

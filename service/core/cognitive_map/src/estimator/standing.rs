@@ -2,14 +2,19 @@
 //!
 //! A gyroscope of a body that stands reads its bias. A body that really turned so slowly on one
 //! spot would read the same, but hardly any does. How slow is standing depends on the body: nothing
-//! is taken for it before the body has gone many times faster, so who always creeps never stands.
+//! is taken for it before the body has gone many times faster, so a body that always creeps is
+//! never taken to stand.
 //!
 //! ```text
-//! stands    |v| ≤ v_max and |ω_k| ≤ m σ_bias      reads    ω = bias + n      n ~ N(0, d²/T + s²/T²)
+//! second     |v| ≤ v_max and |mean ω_k| ≤ min(m σ_bias, ω_max)
+//! bias       mean ω over all seconds of a stand      variance    max(d²/T, spread/n) + s²/T²
 //! ```
+
+use std::sync::Arc;
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
+use super::agent_filter::{AgentFilter, BODY_DIM};
 use super::calibration::LASTING_DIM;
 use super::effect::Effect;
 use super::frame::Frame;
@@ -18,67 +23,161 @@ use super::joint::Estimator;
 use super::odometry_reading::OdometryReading;
 use super::parameters::Parameters;
 use super::tuning::{
-    STANDING_CONTRAST, STANDING_RATE_SD, STANDING_RATE_SD_RAD_SQRT_S, STANDING_S_MAX,
-    STANDING_S_MIN, STANDING_SPEED_MAX_M_S, STANDING_TURN_SD_RAD,
+    STANDING_CONTRAST, STANDING_CREEP_M_S, STANDING_INTERVAL_S_MAX, STANDING_RATE_MAX_RAD_S,
+    STANDING_RATE_SD, STANDING_RATE_SD_RAD_SQRT_S, STANDING_S_MAX, STANDING_SPEED_MAX_M_S,
+    STANDING_TURN_SD_RAD, STANDING_WAY_MAX_M, STANDING_WINDOW_S,
 };
 
-/// What was read while a body seemed to stand.
+/// What was read over some time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Standing {
+pub(super) struct Read {
     /// Rotation \[rad\].
     pub(super) turned: Vector3<f64>,
     /// Length of the way \[m\].
     pub(super) went_m: f64,
     /// How long \[s\].
     pub(super) time_s: f64,
+    /// Of that, how long a rotation was read that is not zero \[s\].
+    pub(super) turning_s: f64,
 }
 
-/// The bias of a gyroscope about each axis about which it was read.
+/// What was read while a body seemed to stand.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Standing {
+    /// In the second under way.
+    pub(super) window: Read,
+    /// In the whole seconds before it.
+    pub(super) stood: Read,
+    /// Their number, and the sum of the squares of their rates \[rad²/s²\].
+    pub(super) windows: f64,
+    pub(super) squares: Vector3<f64>,
+    /// The way since \[m\].
+    pub(super) since_m: f64,
+}
+
+/// The bias of a gyroscope about the axes about which it was read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MeasuredBias {
     pub(super) rate_rad_s: Vector3<f64>,
-    /// Ones for the axes about which it was read.
-    pub(super) axes: Vector3<f64>,
-    /// Variance about each axis \[rad²/s²\].
-    pub(super) variance: f64,
+    /// Variance about each axis \[rad²/s²\]; infinite where none was read.
+    pub(super) variance: Vector3<f64>,
+}
+
+impl Read {
+    fn add(&mut self, next: &Self) {
+        self.turned += next.turned;
+        self.went_m += next.went_m;
+        self.time_s += next.time_s;
+        self.turning_s += next.turning_s;
+    }
+
+    fn halve(&mut self) {
+        self.turned *= 0.5;
+        self.went_m *= 0.5;
+        self.time_s *= 0.5;
+        self.turning_s *= 0.5;
+    }
 }
 
 impl Standing {
-    /// Takes in a motion, of odometry whose bias has this deviation; answers what it has read of
-    /// the bias before, once the body is seen to have stood.
+    /// Takes in a motion that lasted so long, of odometry whose bias has this deviation; answers
+    /// what has been read of the bias, once the body is seen to have stood.
     #[inline]
     pub(super) fn take_in(
         &mut self,
         reading: &OdometryReading,
+        duration_s: f64,
         bias_sd_rad_s: f64,
     ) -> Option<MeasuredBias> {
-        let time_s = reading.moving_s();
-        if time_s == 0.0 {
-            return None; // at rest without any bias, or of no duration
-        }
         let length_m = reading.lengths.norm();
-        if length_m <= STANDING_SPEED_MAX_M_S * time_s {
-            let most = STANDING_RATE_SD * bias_sd_rad_s * time_s;
-            if reading.angles.iter().all(|angle| angle.abs() <= most)
-                && reading.angles != Vector3::zeros()
-                && self.time_s < STANDING_S_MAX
-            {
-                self.turned += reading.angles;
-                self.went_m += length_m;
-                self.time_s += time_s;
+        if length_m <= STANDING_SPEED_MAX_M_S * duration_s {
+            self.stay(reading, length_m, duration_s, bias_sd_rad_s);
+            return None;
+        }
+        self.window = Read::default();
+        if self.windows == 0.0 {
+            return None;
+        }
+        let crept_m_s = (self.stood.went_m / self.stood.time_s).max(STANDING_CREEP_M_S);
+        if length_m >= STANDING_CONTRAST * crept_m_s * duration_s {
+            return std::mem::take(self).measured();
+        }
+        self.since_m += length_m;
+        if self.since_m > STANDING_WAY_MAX_M {
+            *self = Self::default();
+        }
+        None
+    }
+
+    /// A motion that is next to none.
+    fn stay(
+        &mut self,
+        reading: &OdometryReading,
+        length_m: f64,
+        duration_s: f64,
+        bias_sd_rad_s: f64,
+    ) {
+        if duration_s > STANDING_INTERVAL_S_MAX {
+            self.window = Read::default(); // motions may be missing
+            return;
+        }
+        let is_turning = reading.angles != Vector3::zeros();
+        self.window.add(&Read {
+            turned: reading.angles,
+            went_m: length_m,
+            time_s: duration_s,
+            turning_s: if is_turning { duration_s } else { 0.0 },
+        });
+        if self.window.time_s < STANDING_WINDOW_S {
+            return;
+        }
+        let window = std::mem::take(&mut self.window);
+        let rate = window.turned / window.time_s;
+        let most = (STANDING_RATE_SD * bias_sd_rad_s).min(STANDING_RATE_MAX_RAD_S);
+        if rate.iter().any(|rate| rate.abs() > most) {
+            *self = Self::default(); // it turns
+            return;
+        }
+        self.stood.add(&window);
+        self.windows += 1.0;
+        self.squares += rate.component_mul(&rate);
+        self.since_m = 0.0;
+        if self.stood.time_s > STANDING_S_MAX {
+            // What was read lately counts for more.
+            self.stood.halve();
+            self.windows *= 0.5;
+            self.squares *= 0.5;
+        }
+    }
+
+    /// What a stand that is over says of the bias. Where mostly no rotation was read, as by wheels,
+    /// it says nothing.
+    fn measured(&self) -> Option<MeasuredBias> {
+        let time_s = self.stood.time_s;
+        if 2.0 * self.stood.turning_s < time_s {
+            return None;
+        }
+        let rate_rad_s = self.stood.turned / time_s;
+        let density = STANDING_RATE_SD_RAD_SQRT_S.powi(2) / time_s;
+        let settled = (STANDING_TURN_SD_RAD / time_s).powi(2);
+        let variance = self.squares.zip_map(&rate_rad_s, |square, rate| {
+            if square == 0.0 {
+                return f64::INFINITY;
             }
-            return None;
-        }
-        if self.time_s == 0.0 || length_m * self.time_s < STANDING_CONTRAST * self.went_m * time_s {
-            return None;
-        }
-        let stood = std::mem::take(self);
-        (stood.time_s >= STANDING_S_MIN).then(|| MeasuredBias {
-            rate_rad_s: stood.turned / stood.time_s,
-            axes: stood.turned.map(|angle| f64::from(u8::from(angle != 0.0))),
-            variance: STANDING_RATE_SD_RAD_SQRT_S.powi(2) / stood.time_s
-                + (STANDING_TURN_SD_RAD / stood.time_s).powi(2),
+            let spread = (square / self.windows - rate * rate).max(0.0);
+            density.max(spread / self.windows) + settled
+        });
+        Some(MeasuredBias {
+            rate_rad_s,
+            variance,
         })
+    }
+}
+
+impl MeasuredBias {
+    /// The axes about which it was read.
+    fn axes(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..3).filter(|&axis| self.variance[axis].is_finite())
     }
 }
 
@@ -90,10 +189,46 @@ impl Estimator {
         measured: &MeasuredBias,
         effects: &mut Vec<Effect>,
     ) {
-        self.alter(agent, effects, |frame, index, parameters| {
-            frame.learn_bias(index, measured, parameters);
-            true
-        });
+        let Some(number) = self.frame_of(agent) else {
+            return;
+        };
+        if let Some(slot) = self.slots.get_mut(agent as usize, 0)
+            && let Some(detached) = &mut slot.detached
+        {
+            let filter = &mut Arc::make_mut(&mut detached.state).filter;
+            filter.learn_bias(measured, &self.parameters);
+            return;
+        }
+        let Some(frame) = self.frames.get_mut(number, 0) else {
+            return;
+        };
+        if let Some(index) = frame.member(agent) {
+            frame.learn_bias(index, measured, &self.parameters);
+            self.sweep(number, effects);
+        }
+    }
+}
+
+/// Number of the component of a body's error that is the bias about an axis.
+fn component(axis: usize) -> usize {
+    BODY_DIM - LASTING_DIM + 2 + axis
+}
+
+impl AgentFilter {
+    /// A measurement of the bias of odometry. What the body has turned by meanwhile follows.
+    fn learn_bias(&mut self, measured: &MeasuredBias, parameters: &Parameters) {
+        for axis in measured.axes() {
+            let k = component(axis);
+            let own = *self.covariance_mut();
+            let residual = measured.rate_rad_s[axis] - self.calibration.bias_rad_s[axis];
+            let s = own[(k, k)] + measured.variance[axis];
+            if residual * residual > parameters.gate.powi(2) * s {
+                continue;
+            }
+            let gain = own.column(k) / s;
+            *self.covariance_mut() -= gain * gain.transpose() * s;
+            self.correct(&(gain * residual), parameters);
+        }
     }
 }
 
@@ -102,21 +237,25 @@ impl Frame {
     /// was seen since, follow.
     fn learn_bias(&mut self, index: usize, measured: &MeasuredBias, parameters: &Parameters) {
         self.flush();
-        for axis in (0..3).filter(|axis| measured.axes[*axis] > 0.0) {
+        let corrected = self.corrected_by(index);
+        for axis in measured.axes() {
             let member = &self.members[index];
-            let mut jacobian = SMatrix::<f64, 1, 6>::zeros();
-            jacobian[2 + axis] = 1.0;
             let block = Block {
-                offset: member.offset + 6,
-                width: LASTING_DIM,
-                jacobian,
+                offset: member.offset + component(axis),
+                width: 1,
+                jacobian: SMatrix::<f64, 1, 6>::identity(),
             };
             let own = member.filter().calibration.bias_rad_s[axis];
             let residual = SVector::<f64, 1>::new(measured.rate_rad_s[axis] - own);
             let projection = self.covariance.project(&[block]);
-            let s = projection.spread + SMatrix::<f64, 1, 1>::new(measured.variance);
-            let all = self.covariance.all();
-            if let Some(correction) = self.covariance.update(projection, &residual, &s, &all) {
+            let s = projection.spread + SMatrix::<f64, 1, 1>::new(measured.variance[axis]);
+            if residual[0] * residual[0] > parameters.gate.powi(2) * s[(0, 0)] {
+                continue;
+            }
+            if let Some(correction) = self
+                .covariance
+                .update(projection, &residual, &s, &corrected)
+            {
                 self.correct(index, &correction, parameters);
             }
         }
@@ -129,48 +268,77 @@ mod tests {
     use crate::input::Motion;
     use nalgebra::UnitQuaternion;
 
-    /// What is read of the bias where a body stands for so long, turning so fast and drifting so
-    /// fast by its odometry, and then goes at a speed.
-    fn read(time_s: f64, rate_rad_s: f64, drift_m_s: f64, speed_m_s: f64) -> Option<MeasuredBias> {
-        let (mut standing, step_s) = (Standing::default(), 0.1);
-        let mut go = |speed_m_s: f64, rate_rad_s: f64| {
-            let ahead = Vector3::new(speed_m_s * step_s, 0.0, 0.0);
-            let turn = UnitQuaternion::new(Vector3::z() * (rate_rad_s * step_s))
-                .coords
-                .into();
-            let motion = Motion::from_increment(ahead.into(), turn, None).unwrap();
-            standing.take_in(&OdometryReading::new(&motion, step_s), 0.004)
-        };
-        for _ in 0..(time_s / step_s).round() as u32 {
-            assert_eq!(go(drift_m_s, rate_rad_s), None, "it may creep");
+    const STEP_S: f64 = 0.1;
+
+    fn go(standing: &mut Standing, speed_m_s: f64, rate_rad_s: f64) -> Option<MeasuredBias> {
+        let ahead = Vector3::new(speed_m_s * STEP_S, 0.0, 0.0);
+        let turn = UnitQuaternion::new(Vector3::z() * (rate_rad_s * STEP_S));
+        let motion = Motion::from_increment(ahead.into(), turn.coords.into(), None).unwrap();
+        standing.take_in(&OdometryReading::new(&motion, STEP_S), STEP_S, 0.004)
+    }
+
+    /// What is read of the bias where a body stands for so long, reading such rates and drifting
+    /// so fast, and then goes at a speed.
+    fn read(
+        time_s: f64,
+        rate_rad_s: impl Fn(u32) -> f64,
+        drift_m_s: f64,
+        speed_m_s: f64,
+    ) -> Option<MeasuredBias> {
+        let mut standing = Standing::default();
+        for k in 0..(time_s / STEP_S).round() as u32 {
+            assert_eq!(go(&mut standing, drift_m_s, rate_rad_s(k)), None);
         }
-        go(speed_m_s, 0.1)
+        go(&mut standing, speed_m_s, 0.1)
     }
 
     #[test]
     fn a_standing_body_reads_its_bias_of_either_sign() {
         for rate in [0.006, -0.006] {
             for drift in [0.0, 0.008] {
-                let bias = read(20.0, rate, drift, 0.5).unwrap();
+                let bias = read(20.0, |_| rate, drift, 0.5).unwrap();
                 assert!((bias.rate_rad_s.z - rate).abs() < 1e-12);
-                assert_eq!(bias.axes, Vector3::z());
-                assert!((0.001..0.0011).contains(&bias.variance.sqrt()));
+                assert_eq!(bias.axes().collect::<Vec<_>>(), [2]);
+                assert!((0.001..0.0011).contains(&bias.variance.z.sqrt()));
             }
         }
     }
 
+    /// Single readings may be far beyond any bias.
+    #[test]
+    fn a_noisy_gyroscope_reads_its_bias_as_well_as_its_noise_lets_it() {
+        let noisy = |k: u32| 0.01 + 0.05 * (f64::from(k) * 12.9898).sin();
+        let bias = read(60.0, noisy, 0.0, 0.5).unwrap();
+        let off = (bias.rate_rad_s.z - 0.01).abs();
+        assert!(
+            off < 3.0 * bias.variance.z.sqrt() && off < 0.003,
+            "{bias:?}"
+        );
+    }
+
     #[test]
     fn who_creeps_or_turns_or_reads_no_turn_does_not_stand() {
-        assert_eq!(read(20.0, 0.006, 0.008, 0.1), None, "it creeps");
-        assert_eq!(read(20.0, 0.006, 0.03, 3.0), None, "it goes");
-        assert_eq!(read(20.0, 0.02, 0.0, 0.5), None, "it turns");
-        assert_eq!(read(20.0, 0.0, 0.0, 0.5), None, "it reads nothing at rest");
-        assert_eq!(read(0.5, 0.006, 0.0, 0.5), None, "it hardly stopped");
+        assert_eq!(read(20.0, |_| 0.006, 0.008, 0.1), None, "it creeps");
+        assert_eq!(read(20.0, |_| 0.006, 0.0, 0.05), None, "it may creep");
+        assert_eq!(read(20.0, |_| 0.006, 0.03, 3.0), None, "it goes");
+        assert_eq!(read(20.0, |_| 0.03, 0.0, 0.5), None, "it turns");
+        assert_eq!(read(20.0, |_| 0.0, 0.0, 0.5), None, "it reads nothing");
+        let rarely = |k: u32| if k % 10 == 0 { 0.01 } else { 0.0 };
+        assert_eq!(
+            read(20.0, rarely, 0.0, 0.5),
+            None,
+            "it reads next to nothing"
+        );
+        assert_eq!(read(0.5, |_| 0.006, 0.0, 0.5), None, "it hardly stopped");
+        // One turn among the seconds ends the stand before it.
+        let once = |k: u32| if (100..120).contains(&k) { 0.2 } else { 0.006 };
+        let bias = read(20.0, once, 0.0, 0.5).unwrap();
+        assert!(bias.variance.z.sqrt() > 0.002, "{bias:?}");
     }
 
     #[test]
     fn a_short_stop_says_little() {
-        let sd = |time_s| read(time_s, 0.006, 0.0, 0.5).unwrap().variance.sqrt();
-        assert!(sd(2.0) > 0.01 && sd(5.0) > 0.004 && sd(50.0) < 0.0005);
+        let sd = |time_s| read(time_s, |_| 0.006, 0.0, 0.5).unwrap().variance.z.sqrt();
+        assert!(sd(2.1) > 0.009 && sd(5.1) > 0.003 && sd(50.1) < 0.0006);
     }
 }

@@ -42,15 +42,24 @@ pub(super) const SENSOR_TARGETS_MAX: usize = 128;
 
 /// Longest interval between two motions over which a bias counts \[s\].
 pub(super) const MOTION_INTERVAL_S_MAX: f64 = 10.0;
-/// Fastest that a body goes which may be standing \[m/s\]: odometry of one that stands drifts by
-/// millimetres a second.
+/// Fastest that a body goes which may be standing \[m/s\]. Source: odometry of one that stands
+/// drifts by millimetres a second.
 pub(super) const STANDING_SPEED_MAX_M_S: f64 = 0.02;
-/// Fastest that it turns, in deviations of the bias.
+/// Fastest that it turns in a second: in deviations of the bias, and whatever that is \[rad/s\].
+/// Source: robots that turn on the spot turn by degrees a second.
 pub(super) const STANDING_RATE_SD: f64 = 3.0;
-/// How many times faster it must be seen to go to have been standing.
+pub(super) const STANDING_RATE_MAX_RAD_S: f64 = 0.02;
+/// How many times faster it must be seen to go to have been standing, and the speed that counts at
+/// least \[m/s\]: so a body that never goes a decimetre a second is not taken to stand.
 pub(super) const STANDING_CONTRAST: f64 = 20.0;
-/// Least and most time over which a bias is read \[s\].
-pub(super) const STANDING_S_MIN: f64 = 1.0;
+pub(super) const STANDING_CREEP_M_S: f64 = 0.005;
+/// Way without being seen to go so fast after which it is not known to have stood \[m\].
+pub(super) const STANDING_WAY_MAX_M: f64 = 2.0;
+/// Time of which the mean rate is looked at \[s\].
+pub(super) const STANDING_WINDOW_S: f64 = 1.0;
+/// Longest interval between two motions of a stand \[s\]: after a longer one some may be missing.
+pub(super) const STANDING_INTERVAL_S_MAX: f64 = 1.5;
+/// Time beyond which what was read at first counts for less \[s\].
 pub(super) const STANDING_S_MAX: f64 = 100.0;
 /// Noise density of a standing gyroscope \[rad/s/√Hz\]. Source: data sheets of small ones give
 /// 0.0001 to 0.0005; wheels and engines shake.
@@ -197,7 +206,11 @@ pub(super) const CIRCLE_VARIANCE_MAX: f64 = 30.0;
 pub(super) const RANGED_MAX: usize = 32;
 /// Most places where one of them may be. Source: twice those by one distance, for the first ones may
 /// have been those of reflections.
-pub(super) const RANGE_POINTS_MAX: usize = 576;
+pub(super) const RANGE_POINTS_MAX: usize = {
+    let rings = (RANGE_LAYERS * RANGE_RING_POINTS) as usize;
+    let sphere = RANGE_SPHERE_POINTS as usize;
+    2 * if rings > sphere { rings } else { sphere }
+};
 /// Places on a ring about the antenna. Source: with spacing and deviation of an eighth of a radian,
 /// an arc differs from its tangent by a hundredth of its radius.
 pub(super) const RANGE_RING_POINTS: u32 = 48;

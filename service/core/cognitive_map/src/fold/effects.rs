@@ -36,12 +36,14 @@ impl Fold<'_> {
         for effect in effects.drain(..) {
             match effect {
                 Effect::SetAside { agent } => self.keyframes.set_aside(agent),
-                Effect::Moved { step, .. } => self.keyframes.graph.motion(
-                    &self.moment(),
-                    &step.increment,
-                    &step.variance,
-                    &step.calibrated,
-                ),
+                Effect::Moved { agent, step } => {
+                    let (moment, graph) = (self.moment(), &mut self.keyframes.graph);
+                    let (increment, variance) = (&step.increment, &step.variance);
+                    graph.motion(&moment, increment, variance, &step.calibrated);
+                    if step.ends_stand() {
+                        graph.end_motion(agent);
+                    }
+                }
                 Effect::LandmarkSighted {
                     label,
                     relation: Relation::Range(range),

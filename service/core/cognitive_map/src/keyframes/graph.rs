@@ -278,6 +278,15 @@ impl KeyframeGraph {
         }
     }
 
+    /// An agent's motions are corrected in another way from now on: those until now end at a
+    /// keyframe.
+    pub fn end_motion(&mut self, agent: u32) {
+        let track = self.chains.track(agent);
+        if track.is_some_and(|track| !track.needs_keyframe && !track.is_near((0.0, 0.0))) {
+            self.add_keyframe(agent);
+        }
+    }
+
     /// Adds a keyframe where an agent is; answers its number, or that of the latest one if memory
     /// is full.
     pub(super) fn add_keyframe(&mut self, agent: u32) -> u32 {

@@ -64,10 +64,9 @@ impl Shortlist {
     pub(crate) fn find(&mut self, packed: &PackedPlaces, point: &Point3<f64>, variance_m2: f64) {
         let reach_m = packed.rounded_reach_m(variance_m2);
         let apart_m = self.ball.map(|(middle, _)| (point - middle).norm());
-        let is_listed = { self.ball.zip(apart_m) }
-            .is_some_and(|((_, radius_m), apart_m)| {
-                apart_m + reach_m <= radius_m && radius_m <= SHORTLIST_WIDEST * reach_m
-            });
+        let is_listed = { self.ball.zip(apart_m) }.is_some_and(|((_, radius_m), apart_m)| {
+            apart_m + reach_m <= radius_m && radius_m <= SHORTLIST_WIDEST * reach_m
+        });
         if !is_listed {
             let slack_m = SHORTLIST_SLACK * reach_m;
             // What lies apart from the search before does so from the next one, mostly.

@@ -76,3 +76,13 @@ impl ReplayArgs {
         self.space.clone().unwrap_or_else(|| otherwise.to_owned())
     }
 }
+
+/// A share below one, of what is added or changed.
+pub(super) fn share(text: &str) -> Result<f64, String> {
+    let share: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if (0.0..=0.99).contains(&share) {
+        Ok(share)
+    } else {
+        Err("not from 0 to 0.99".to_owned())
+    }
+}

@@ -7,7 +7,7 @@ use cogmap::cli::output;
 use cogmap_lab::csv::TableSet;
 use serde::Serialize;
 
-use super::arguments::ReplayArgs;
+use super::arguments::{ReplayArgs, share};
 use super::csv_waking::Waking;
 use super::errors::Errors;
 use super::recording::{Recording, Selection, Sharing};
@@ -41,6 +41,13 @@ pub(in crate::cli) struct CsvArgs {
     /// Take the agents in a random order, by this seed; in order of time when absent.
     #[arg(long, value_name = "SEED")]
     shuffle: Option<u64>,
+    /// Make this share of the distances 15 m too long, at random, as if they had come by way of a
+    /// wall.
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    reflect: Option<f64>,
+    /// Seed of which ones.
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    reflect_seed: u64,
     #[command(flatten)]
     replay: ReplayArgs,
 }
@@ -57,7 +64,10 @@ struct CsvReport {
 }
 
 pub(super) fn run(args: &CsvArgs) -> anyhow::Result<()> {
-    let set = TableSet::load(&args.directory)?;
+    let mut set = TableSet::load(&args.directory)?;
+    if let Some(share) = args.reflect {
+        set.reflect(share, args.reflect_seed);
+    }
     let selection = args.selection();
     let replayed = Recording::new(&set, &selection)?.replay(&args.replay)?;
     let report = CsvReport {

@@ -9,7 +9,7 @@ use cogmap_lab::tuc::{Motion, Tuc};
 use serde::Serialize;
 use trajectory::{Alignment, Span};
 
-use super::arguments::ReplayArgs;
+use super::arguments::{ReplayArgs, share};
 use super::case::Case;
 use super::report::Report;
 use super::scoring::{Pairing, Scoring};
@@ -105,14 +105,4 @@ pub(super) fn run(args: &TucArgs) -> anyhow::Result<()> {
     let share = 100.0 * report.false_share.unwrap_or(0.0);
     output::line(&format!("{n} place matches, {share:.1} % of them false"))?;
     report.report.print()
-}
-
-/// A share of matches that can be reached by adding some.
-fn share(text: &str) -> Result<f64, String> {
-    let share: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    if (0.0..=0.99).contains(&share) {
-        Ok(share)
-    } else {
-        Err("not from 0 to 0.99".to_owned())
-    }
 }

@@ -30,7 +30,7 @@ use super::ranging::Ranging;
 use super::sensor::{Sensor, SightingTarget};
 use super::sighting_pair::{Anchor, NoisyMotion};
 use super::sightings::{CrossFrameSighting, PendingSighting};
-use super::standing::Standing;
+use super::standing::{Read, Standing};
 use super::tuning::{
     ARCHIVE_PART_MAX, ARCHIVE_PARTS, ASSOCIATIONS_MAX, CROSS_SIGHTINGS_MAX, FRAME_MATCHES_MAX,
     HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, NOISE_SHARES_MAX, NOISE_TARGETS_MAX, OBSERVERS_MAX,
@@ -75,10 +75,18 @@ state_of_struct!(AgentFilter {
     noise,
     standing
 });
-state_of_struct!(Standing {
+state_of_struct!(Read {
     turned,
     went_m,
-    time_s
+    time_s,
+    turning_s
+});
+state_of_struct!(Standing {
+    window,
+    stood,
+    windows,
+    squares,
+    since_m
 });
 state_of_struct!(NoisyMotion {
     by_lengths,
@@ -122,7 +130,8 @@ state_of_struct!(RangeHypotheses {
     used,
     taken,
     outlying,
-    log_evidence
+    log_evidence,
+    at_most_m
 });
 state_of_struct!(Ranging {
     landmarks as MapUpTo<RANGED_MAX>,
