@@ -141,8 +141,10 @@ mod tests {
             let motion = Motion::from_increment(ahead.into(), turn, None).unwrap();
             standing.take_in(&OdometryReading::new(&motion, step_s), 0.004)
         };
-        for _ in 0..(time_s / step_s).round() as u32 {
+        let mut stood_s = 0.0;
+        while stood_s < time_s - 0.5 * step_s {
             assert_eq!(go(drift_m_s, rate_rad_s), None, "it may creep");
+            stood_s += step_s;
         }
         go(speed_m_s, 0.1)
     }
