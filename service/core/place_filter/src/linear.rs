@@ -27,8 +27,9 @@ pub(crate) struct Lower {
 
 impl Lower {
     /// The factor of a symmetric matrix; `None` if that is not positive definite. `entries` answers
-    /// the entries of a row in [`LANES`] columns from one on: those beyond the last column are not
-    /// used, but finite, and those beyond the diagonal are those of the matrix.
+    /// the entries of a row in [`LANES`] columns from one on: those beyond the last column may be
+    /// anything, since nothing that is read depends on them, and those beyond the diagonal are
+    /// those of the matrix.
     pub(crate) fn factor(n: usize, entries: impl Fn(usize, usize) -> Row) -> Option<Self> {
         let mut factor = Self {
             n,
@@ -145,8 +146,8 @@ impl Lower {
 }
 
 /// Factors the first rows and columns of a symmetric matrix in place, so that K = Uᵀ U, with the
-/// reciprocals of the diagonal; answers whether it is positive definite. Below its diagonal and
-/// beyond those columns it holds nothing.
+/// reciprocals of the diagonal; answers whether it is positive definite. What stands below its
+/// diagonal and beyond those columns must not be read.
 #[expect(
     clippy::inline_always,
     reason = "compiled for the vectors of a dispatch"
@@ -212,8 +213,10 @@ pub(crate) fn subtract_products(rows: &[Row], from: &mut [Row; LANES]) {
             for row in rows {
                 // Copies and counted loops: with references the compiler does not keep the sums in
                 // registers.
-                let factors: [f64; TILE] = row[first..first + TILE].try_into().expect("so long");
-                let lanes: [f64; HALF] = row[column..column + HALF].try_into().expect("so long");
+                let factors: [f64; TILE] =
+                    { row[first..first + TILE].try_into() }.expect("the slice has TILE numbers");
+                let lanes: [f64; HALF] =
+                    { row[column..column + HALF].try_into() }.expect("the slice has HALF numbers");
                 for k in 0..TILE {
                     for lane in 0..HALF {
                         sums[k][lane] += factors[k] * lanes[lane];

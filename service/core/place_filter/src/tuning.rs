@@ -98,7 +98,7 @@ pub(crate) mod search {
     pub(crate) const NODES: usize = 16;
     /// Rounds without looking for places, at most, while there is a likely pose.
     pub(crate) const ROUNDS_PER_SCAN: u32 = 6;
-    /// Work of a search with a record, in places that are looked at: 0.5 ms or so.
+    /// Work of a search with a record, in places that are looked at.
     pub(crate) const WORK: u32 = 4096;
     /// Places that are looked at in a step.
     pub(crate) const SCANNED: u32 = 512;

@@ -277,16 +277,16 @@ mod tests {
         standing.take_in(&OdometryReading::new(&motion, STEP_S), STEP_S, 0.004)
     }
 
-    /// What is read of the bias where a body stands for so long, reading such rates and drifting
-    /// so fast, and then goes at a speed.
+    /// What is read of the bias where a body stands for so many tenths of a second, reading such
+    /// rates and drifting so fast, and then goes at a speed.
     fn read(
-        time_s: f64,
+        tenths: u32,
         rate_rad_s: impl Fn(u32) -> f64,
         drift_m_s: f64,
         speed_m_s: f64,
     ) -> Option<MeasuredBias> {
         let mut standing = Standing::default();
-        for k in 0..(time_s / STEP_S).round() as u32 {
+        for k in 0..tenths {
             assert_eq!(go(&mut standing, drift_m_s, rate_rad_s(k)), None);
         }
         go(&mut standing, speed_m_s, 0.1)
@@ -296,7 +296,7 @@ mod tests {
     fn a_standing_body_reads_its_bias_of_either_sign() {
         for rate in [0.006, -0.006] {
             for drift in [0.0, 0.008] {
-                let bias = read(20.0, |_| rate, drift, 0.5).unwrap();
+                let bias = read(200, |_| rate, drift, 0.5).unwrap();
                 assert!((bias.rate_rad_s.z - rate).abs() < 1e-12);
                 assert_eq!(bias.axes().collect::<Vec<_>>(), [2]);
                 assert!((0.001..0.0011).contains(&bias.variance.z.sqrt()));
@@ -308,7 +308,7 @@ mod tests {
     #[test]
     fn a_noisy_gyroscope_reads_its_bias_as_well_as_its_noise_lets_it() {
         let noisy = |k: u32| 0.01 + 0.05 * (f64::from(k) * 12.9898).sin();
-        let bias = read(60.0, noisy, 0.0, 0.5).unwrap();
+        let bias = read(600, noisy, 0.0, 0.5).unwrap();
         let off = (bias.rate_rad_s.z - 0.01).abs();
         assert!(
             off < 3.0 * bias.variance.z.sqrt() && off < 0.003,
@@ -318,27 +318,27 @@ mod tests {
 
     #[test]
     fn who_creeps_or_turns_or_reads_no_turn_does_not_stand() {
-        assert_eq!(read(20.0, |_| 0.006, 0.008, 0.1), None, "it creeps");
-        assert_eq!(read(20.0, |_| 0.006, 0.0, 0.05), None, "it may creep");
-        assert_eq!(read(20.0, |_| 0.006, 0.03, 3.0), None, "it goes");
-        assert_eq!(read(20.0, |_| 0.03, 0.0, 0.5), None, "it turns");
-        assert_eq!(read(20.0, |_| 0.0, 0.0, 0.5), None, "it reads nothing");
+        assert_eq!(read(200, |_| 0.006, 0.008, 0.1), None, "it creeps");
+        assert_eq!(read(200, |_| 0.006, 0.0, 0.05), None, "it may creep");
+        assert_eq!(read(200, |_| 0.006, 0.03, 3.0), None, "it goes");
+        assert_eq!(read(200, |_| 0.03, 0.0, 0.5), None, "it turns");
+        assert_eq!(read(200, |_| 0.0, 0.0, 0.5), None, "it reads nothing");
         let rarely = |k: u32| if k % 10 == 0 { 0.01 } else { 0.0 };
         assert_eq!(
-            read(20.0, rarely, 0.0, 0.5),
+            read(200, rarely, 0.0, 0.5),
             None,
             "it reads next to nothing"
         );
-        assert_eq!(read(0.5, |_| 0.006, 0.0, 0.5), None, "it hardly stopped");
+        assert_eq!(read(5, |_| 0.006, 0.0, 0.5), None, "it hardly stopped");
         // One turn among the seconds ends the stand before it.
         let once = |k: u32| if (100..120).contains(&k) { 0.2 } else { 0.006 };
-        let bias = read(20.0, once, 0.0, 0.5).unwrap();
+        let bias = read(200, once, 0.0, 0.5).unwrap();
         assert!(bias.variance.z.sqrt() > 0.002, "{bias:?}");
     }
 
     #[test]
     fn a_short_stop_says_little() {
-        let sd = |time_s| read(time_s, |_| 0.006, 0.0, 0.5).unwrap().variance.z.sqrt();
-        assert!(sd(2.1) > 0.009 && sd(5.1) > 0.003 && sd(50.1) < 0.0006);
+        let sd = |tenths| read(tenths, |_| 0.006, 0.0, 0.5).unwrap().variance.z.sqrt();
+        assert!(sd(21) > 0.009 && sd(51) > 0.003 && sd(501) < 0.0006);
     }
 }

@@ -130,8 +130,8 @@ fn distances_that_are_sometimes_far_too_long_mislead_nobody() {
 fn a_beacon_is_found_whose_first_distances_were_reflected() {
     for wrong in 1..4 {
         let mut ranger = Ranger::new();
-        let reflected = |k: u32, beacon: usize| (beacon as u32 * 11 + k) % 44 < wrong;
-        for k in 0..4 {
+        let reflected = |k: u32, beacon: usize| (beacon * 11 + k as usize) % 44 < wrong;
+        for k in 0..4_usize {
             ranger.measure(0, if k < wrong { 15.0 } else { 0.0 });
         }
         ranger.tour(

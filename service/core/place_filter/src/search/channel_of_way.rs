@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
 use pulp::Arch;
 
-use super::points::{Lanes, Points, put};
+use super::points::{Lanes, Points, put_from};
 use crate::field::Field;
 use crate::kernel::Kernel;
 use crate::linear::{LANES, Lower, Row, subtract_products};
@@ -35,7 +35,8 @@ pub(super) struct FeltAt {
     level: f64,
 }
 
-/// What a channel says at a pose, of each of its levels; the lanes after them hold nothing.
+/// What a channel says at a pose, of each of its levels; the lanes after them must not be
+/// read.
 pub(super) struct Expected {
     /// Levels less what is expected.
     pub(super) residuals: Row,
@@ -160,7 +161,7 @@ impl ChannelOfWay {
         let mut points = [[0.0; LANES]; 3];
         let mut residuals = [0.0; LANES];
         for (lane, felt) in self.felt.iter().enumerate() {
-            put(&mut points, lane, &(pose * felt.at + drift * felt.drift_m));
+            put_from(&mut points, lane, &(pose * felt.at + drift * felt.drift_m));
             residuals[lane] = felt.level;
         }
         let mut expected = Expected {
@@ -223,7 +224,7 @@ impl ChannelOfWay {
         let m = self.felt.len();
         let mut points = [[0.0; LANES]; 3];
         for (lane, felt) in self.felt.iter().enumerate() {
-            put(&mut points, lane, &(pose * felt.at));
+            put_from(&mut points, lane, &(pose * felt.at));
         }
         let squared_length = self.kernel.length_m * self.kernel.length_m;
         let mut all = std::array::from_fn(|_| DMatrix::zeros(0, 0));

@@ -7,7 +7,8 @@ use crate::linear::{LANES, Row};
 /// Coordinates of as many points, along each axis.
 pub(super) type Lanes = [Row; 3];
 
-/// Points, sixteen side by side; beyond the last one there are zeros.
+/// Points, sixteen side by side; the last one stands in all lanes after it, since covariances of a
+/// point far away are so small that processors take long over them.
 pub(super) struct Points {
     blocks: Vec<Lanes>,
     count: usize,
@@ -19,7 +20,7 @@ impl Points {
         let count = points.len();
         let mut blocks = vec![[[0.0; LANES]; 3]; count.div_ceil(LANES)];
         for (number, point) in points.enumerate() {
-            put(&mut blocks[number / LANES], number % LANES, point);
+            put_from(&mut blocks[number / LANES], number % LANES, point);
         }
         Self { blocks, count }
     }
@@ -43,9 +44,29 @@ impl Points {
     }
 }
 
-/// Puts a point into a lane.
-pub(super) fn put(lanes: &mut Lanes, lane: usize, point: &Point3<f64>) {
+/// Puts a point into a lane, and into all lanes after it until another point is put there.
+pub(super) fn put_from(lanes: &mut Lanes, lane: usize, point: &Point3<f64>) {
     for (axis, coordinate) in lanes.iter_mut().zip(point.iter()) {
-        axis[lane] = *coordinate;
+        axis[lane..].fill(*coordinate);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_point_fills_its_block() {
+        let points: Vec<Point3<f64>> = (0..18)
+            .map(|k| Point3::new(f64::from(k), 1e3, -f64::from(k)))
+            .collect();
+        let lanes = Points::new(points.iter());
+        assert_eq!(lanes.len(), points.len());
+        for (number, point) in points.iter().enumerate() {
+            assert_eq!(Point3::from(lanes.at(number)), *point);
+        }
+        for number in points.len()..2 * LANES {
+            assert_eq!(Point3::from(lanes.at(number)), points[17]);
+        }
     }
 }

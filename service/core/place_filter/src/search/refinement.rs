@@ -256,7 +256,8 @@ impl<'a> Way<'a> {
         if !is_definite {
             return None;
         }
-        sums.information += Matrix9::from_fn(|a, b| products[a][b]);
+        // Rounded differently on both sides of its diagonal, the products are not quite symmetric.
+        sums.information += Matrix9::from_fn(|a, b| products[a.min(b)][a.max(b)]);
         sums.gradient += Vector9::from_fn(|k, _| products[RESIDUAL][k]);
         let residuals = || rows.iter().map(|row| &row[RESIDUAL]);
         let squared = residuals().map(|residual| (residual * residual).min(6.25));

@@ -5,15 +5,16 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
-/// Bits of the number of shards at first, when they are more, and at most. A place's insertion
-/// after a snapshot copies one shard, which is one in 4096 entries of a large index; a small one
-/// with as many shards would take more memory than its places.
+/// Bits of the number of shards at first, how many more each split adds, and at most. The first
+/// change after a snapshot copies the list of shards, and the first change of each shard the
+/// entries of that one, which is one in 4096 of a large index; a small index with as many shards
+/// would take more memory than its places.
 const SHARD_BITS_MIN: u32 = 6;
 const SHARD_BITS_STEP: u32 = 3;
 const SHARD_BITS_MAX: u32 = 12;
 /// Places per shard at which it is worth having more of them, counted in the larger number.
 const PLACES_PER_SHARD: usize = 4;
-/// Bits of a shard that tell which blocks hold no place, in words.
+/// 64-bit words of a shard's occupancy bits.
 const OCCUPIED_WORDS: usize = 4;
 /// Lowest bits of a tag: which of the cells of a block.
 const BLOCK_BITS: u32 = 3;
@@ -42,7 +43,7 @@ struct Shard {
     /// beside a way are empty, and to find that out among the entries takes several times as long.
     occupied: [u64; OCCUPIED_WORDS],
     /// Sorted by tag and place, so the places of one cell lie side by side.
-    entries: Arc<[Entry]>,
+    entries: Arc<Vec<Entry>>,
 }
 
 /// The cells that hold places. A clone shares everything until one of both changes.
@@ -85,13 +86,10 @@ impl SpatialIndex {
         let (shard, tag) = self.slot(self.cell(position.coords.into()));
         let shard = &mut Arc::make_mut(&mut self.shards)[shard];
         shard.occupy(tag, self.shard_bits);
-        let (before, after) = shard.entries.split_at(
-            { &shard.entries }.partition_point(|entry| (entry.tag, entry.place) < (tag, place)),
-        );
+        let slot =
+            { &shard.entries }.partition_point(|entry| (entry.tag, entry.place) < (tag, place));
         let near = rounded(position);
-        shard.entries = [before, &[Entry { tag, place, near }], after]
-            .concat()
-            .into();
+        Arc::make_mut(&mut shard.entries).insert(slot, Entry { tag, place, near });
     }
 
     /// Removes a place that was added at this position.
@@ -102,10 +100,8 @@ impl SpatialIndex {
         let Ok(slot) = slot else { return };
         self.places -= 1;
         let shard = &mut Arc::make_mut(&mut self.shards)[shard];
-        shard.entries = [&shard.entries[..slot], &shard.entries[slot + 1..]]
-            .concat()
-            .into();
-        shard.know_occupied(self.shard_bits);
+        Arc::make_mut(&mut shard.entries).remove(slot);
+        shard.recount_occupied(self.shard_bits);
     }
 
     /// Splits every shard into eight. That happens twice in the life of an index, while it is
@@ -119,10 +115,10 @@ impl SpatialIndex {
         }
         let shards = shards.into_iter().map(|entries| {
             let mut shard = Shard {
-                entries: entries.into(),
+                entries: Arc::new(entries),
                 ..Shard::default()
             };
-            shard.know_occupied(self.shard_bits);
+            shard.recount_occupied(self.shard_bits);
             shard
         });
         self.shards = Arc::new(shards.collect());
@@ -131,8 +127,9 @@ impl SpatialIndex {
     /// Bytes of memory that it takes, reserved ones included.
     pub(super) fn bytes(&self) -> usize {
         let shards = self.shards.iter();
-        let entries: usize = shards.map(|shard| shard.entries.len()).sum();
-        let shard = size_of::<Shard>() + 2 * size_of::<usize>();
+        let entries: usize = shards.map(|shard| shard.entries.capacity()).sum();
+        let counts = 2 * size_of::<usize>();
+        let shard = size_of::<Shard>() + counts + size_of::<Vec<Entry>>();
         entries * size_of::<Entry>() + self.shards.len() * shard
     }
 
@@ -217,7 +214,7 @@ impl SpatialIndex {
     }
 
     /// Whether all places are farther from a point than `radius_m`: above and below a floor most
-    /// points are. Distances are rounded by less than what is added.
+    /// points are. The factor covers the rounding of distances.
     fn is_outside(&self, point: &Point3<f64>, radius_m: f64) -> bool {
         let [low, high] = &self.bounds;
         (0..3).any(|axis| {
@@ -256,7 +253,7 @@ impl SpatialIndex {
     #[expect(clippy::cast_possible_truncation, reason = "saturates, as documented")]
     fn cell(&self, position: [f64; 3]) -> Cell {
         position.map(|x| {
-            // Rounded down by hand: `floor` is a call where the processor's own is not assumed.
+            // Without SSE4.1 in the build target, `floor` is a library call.
             let x = x / self.cell_edge_m;
             let whole = x as i64;
             whole.saturating_sub(i64::from(whole as f64 > x))
@@ -286,7 +283,7 @@ impl Shard {
     }
 
     /// Finds out anew which blocks hold a place.
-    fn know_occupied(&mut self, shard_bits: u32) {
+    fn recount_occupied(&mut self, shard_bits: u32) {
         self.occupied = [0; OCCUPIED_WORDS];
         for entry in self.entries.iter() {
             let (word, bit) = class_of(entry.tag, shard_bits);
@@ -385,4 +382,113 @@ fn tag(cell: Cell) -> u32 {
     cell.into_iter().fold(block >> BLOCK_BITS, |tag, index| {
         (tag << 1) | u32::from(index & 1 == 1)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use random::Seeded;
+
+    /// Compares what an index answers within a distance with a scan over all places.
+    fn compare(index: &SpatialIndex, places: &[Option<Point3<f64>>], at: &Point3<f64>) {
+        let limit = 0.5_f64.powi(2);
+        let mut found = Vec::new();
+        let searched = index.search(at, limit, |place| {
+            found.push(place);
+            limit
+        });
+        assert!(searched);
+        found.sort_unstable();
+        found.dedup();
+        let within = |place: &PlaceId| {
+            let position = places[place.0 as usize];
+            position.is_some_and(|position| (position - at).norm_squared() <= limit)
+        };
+        assert!(
+            { &found }
+                .iter()
+                .all(|place| places[place.0 as usize].is_some())
+        );
+        found.retain(within);
+        let numbers = 0..u32::try_from(places.len()).unwrap();
+        let scanned: Vec<_> = numbers.map(PlaceId).filter(within).collect();
+        assert_eq!(found, scanned, "{at}");
+    }
+
+    /// The index is split twice while it grows, and then is asked again.
+    #[test]
+    fn a_large_index_equals_the_scan() {
+        const PLACES: usize = 20_000;
+        let mut random = Seeded(1);
+        let mut somewhere = || {
+            let [x, y, z] = [20.0, 20.0, 2.0].map(|half_m| (2.0 * random.uniform() - 1.0) * half_m);
+            Point3::new(x, y, z)
+        };
+        let mut index = SpatialIndex::new(0.5);
+        let mut places: Vec<Option<Point3<f64>>> = Vec::new();
+        let mut bits = Vec::new();
+        while places.len() < PLACES {
+            let id = PlaceId(u32::try_from(places.len()).unwrap());
+            let at = somewhere();
+            index.insert(id, &at);
+            places.push(Some(at));
+            if bits.last() != Some(&index.shard_bits) {
+                bits.push(index.shard_bits);
+            }
+        }
+        assert_eq!(bits, [6, 9, 12]);
+        let (before, all) = (index.clone(), places.clone());
+        for (number, place) in places.iter_mut().enumerate() {
+            let id = PlaceId(u32::try_from(number).unwrap());
+            let was = place.unwrap();
+            match number % 7 {
+                0 => *place = None,
+                1 => *place = Some(somewhere()),
+                2 => *place = Some(was + nalgebra::Vector3::repeat(0.1)),
+                _ => continue,
+            }
+            index.remove(id, &was);
+            if let Some(at) = place {
+                index.insert(id, at);
+            }
+        }
+        assert_eq!(index.places, places.iter().flatten().count());
+        for number in 0..200 {
+            let at = places[number * 97].unwrap_or_else(&mut somewhere);
+            compare(&index, &places, &at);
+            compare(&index, &places, &somewhere());
+            // A snapshot from before answers as it did.
+            compare(&before, &all, &at);
+        }
+    }
+
+    #[test]
+    fn a_cell_is_rounded_down() {
+        let two = |power: i32| 2.0_f64.powi(power);
+        let numbers = [
+            0.0,
+            0.3,
+            1.0,
+            1.0_f64.next_down(),
+            1.0_f64.next_up(),
+            7.5,
+            two(52) + 0.5,
+            two(53),
+            two(63),
+            two(63).next_down(),
+            two(63).next_up(),
+            1e300,
+            f64::MIN_POSITIVE,
+            f64::INFINITY,
+            f64::NAN,
+        ];
+        for edge_m in [1.0, 0.5, 0.6] {
+            let index = SpatialIndex::new(edge_m);
+            for x in numbers.into_iter().flat_map(|x| [x, -x]) {
+                #[expect(clippy::cast_possible_truncation, reason = "saturates, as cells do")]
+                let cell = (x / edge_m).floor() as i64;
+                assert_eq!(index.cell([x; 3]), [cell; 3], "{x} by {edge_m}");
+            }
+        }
+    }
 }
