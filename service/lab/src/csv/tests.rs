@@ -136,10 +136,9 @@ fn a_view_that_is_not_there_is_an_error() {
 
 #[test]
 fn a_share_of_the_distances_is_reflected() {
-    let text: String = (0..200)
-        .map(|k| format!("{k},a,sighting,landmark,mast,range,7.5,0.1\n"))
-        .collect();
-    let set = TableSet::read(&format!("t_s\n{text}"), "").unwrap();
+    let lines = (0..200).map(|k| format!("{k},a,sighting,landmark,mast,range,7.5,0.1"));
+    let text: Vec<String> = std::iter::once("t_s".to_owned()).chain(lines).collect();
+    let set = TableSet::read(&text.join("\n"), "").unwrap();
     let n_reflected = |share: f64, seed: u64| {
         let mut set = set.clone();
         set.reflect(share, seed);

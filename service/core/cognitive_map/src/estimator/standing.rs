@@ -323,7 +323,7 @@ mod tests {
         assert_eq!(read(200, |_| 0.006, 0.03, 3.0), None, "it goes");
         assert_eq!(read(200, |_| 0.03, 0.0, 0.5), None, "it turns");
         assert_eq!(read(200, |_| 0.0, 0.0, 0.5), None, "it reads nothing");
-        let rarely = |k: u32| if k % 10 == 0 { 0.01 } else { 0.0 };
+        let rarely = |k: u32| if k.is_multiple_of(10) { 0.01 } else { 0.0 };
         assert_eq!(
             read(200, rarely, 0.0, 0.5),
             None,
