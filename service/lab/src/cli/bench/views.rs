@@ -16,13 +16,17 @@ use cogmap::cli::output;
 use cogmap::cli::quantile;
 
 const CHANNEL: &str = "view";
+/// Views between two corners of the square that a robot goes round.
+const EDGE: u32 = 10;
+/// So many views fill rows enough for the square of a robot, and some more.
+const VIEWS_MIN: i64 = 200;
 const UPRIGHT: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct ViewsArgs {
     /// Numbers of views that a surveyor has taken, along rows that fill a square.
     #[arg(long, value_delimiter = ',', default_values_t = [1_000, 20_000],
-        value_parser = clap::value_parser!(u32).range(1..))]
+        value_parser = clap::value_parser!(u32).range(VIEWS_MIN..))]
     views: Vec<u32>,
     /// Way between two views \[m\].
     #[arg(long, default_value_t = 1.0, value_name = "M")]
@@ -85,7 +89,7 @@ pub(super) fn run(args: &ViewsArgs) -> anyhow::Result<()> {
     let mut rows = Vec::new();
     for &views in &args.views {
         output::progress(&format!("taking {views} views"));
-        let mut survey = Survey::new(args, views)?;
+        let survey = Survey::new(args, views)?;
         rows.push(survey.row(args)?);
     }
     if args.json {
@@ -117,6 +121,7 @@ pub(super) fn run(args: &ViewsArgs) -> anyhow::Result<()> {
 }
 
 /// A map of a floor that somebody has walked along.
+#[derive(Clone)]
 struct Survey {
     map: CognitiveMap,
     eye: Eye,
@@ -175,22 +180,26 @@ impl Survey {
         Ok(survey)
     }
 
-    fn row(&mut self, args: &ViewsArgs) -> anyhow::Result<Row> {
+    /// Every robot goes on a clone of the map: its views are in nobody else's.
+    fn row(&self, args: &ViewsArgs) -> anyhow::Result<Row> {
         let (mut placed_us, mut lost_us) = (Vec::new(), Vec::new());
         let mut found = 0;
         for number in 0..args.robots {
             output::progress(&format!("robot {} of {}", number + 1, args.robots));
-            let mut robot = self.walker(self.start_m(number, args.robots))?;
-            self.put(&mut robot)?;
+            let start_m = self.start_m(number, args.robots);
+            let mut own = self.seen_anew(args, number);
+            let mut robot = own.walker(start_m)?;
+            own.put(&mut robot)?;
             for step in 0..args.steps {
                 let to_m = robot.at_m + self.step_m(step);
-                placed_us.push(self.step(&mut robot, &to_m)?);
+                placed_us.push(own.step(&mut robot, &to_m)?);
             }
-            let mut robot = self.walker(self.start_m(number, args.robots))?;
+            let mut own = self.seen_anew(args, number);
+            let mut robot = own.walker(start_m)?;
             for step in 0..args.steps {
                 let to_m = robot.at_m + self.step_m(step);
-                lost_us.push(self.step(&mut robot, &to_m)?);
-                if self.map.agent(robot.agent).is_some_and(Agent::placed) {
+                lost_us.push(own.step(&mut robot, &to_m)?);
+                if own.map.agent(robot.agent).is_some_and(Agent::placed) {
                     found += 1;
                     break;
                 }
@@ -200,22 +209,35 @@ impl Survey {
             views: self.views,
             placed: Times::of(&mut placed_us),
             lost: Times::of(&mut lost_us),
-            scan_us_p50: self.scan(args),
+            scan_us_p50: self.clone().scan(args),
             found,
         })
     }
 
-    /// Where one of some robots begins: spread along the diagonal, beside the rows \[m\].
+    /// A clone for a robot, which sees noise of its own.
+    fn seen_anew(&self, args: &ViewsArgs, number: u32) -> Self {
+        let scenery = Scenery::new(args.seed, args.dimension.into());
+        let seed = args.seed.wrapping_add(1).wrapping_add(number.into());
+        Self {
+            eye: Eye::new(scenery, args.noise, seed),
+            ..self.clone()
+        }
+    }
+
+    /// Where one of some robots begins: spread along the diagonal, beside the rows, and no nearer
+    /// to the end of the full rows than it will go \[m\].
     fn start_m(&self, number: u32, robots: u32) -> Vector3<f64> {
-        let along = (f64::from(number) + 0.5) / f64::from(robots);
-        let at = 0.9 * along * f64::from(self.side) + 0.3;
+        const BESIDE: f64 = 0.3;
+        let rows = self.views / self.side;
+        let share = (f64::from(number) + 0.5) / f64::from(robots);
+        let at = BESIDE + share * (f64::from(rows - 1 - EDGE) - BESIDE);
         Vector3::new(at, at, 0.0) * self.apart_m
     }
 
-    /// A step of a robot: it goes round a square of ten views' distances \[m\].
+    /// A step of a robot, which goes round a square \[m\].
     fn step_m(&self, step: u32) -> Vector3<f64> {
         let axis = [Vector3::x(), Vector3::y(), -Vector3::x(), -Vector3::y()];
-        axis[(step / 10 % 4) as usize] * self.apart_m
+        axis[(step / EDGE % 4) as usize] * self.apart_m
     }
 
     fn walker(&mut self, at_m: Vector3<f64>) -> anyhow::Result<Walker> {
@@ -250,7 +272,8 @@ impl Survey {
         Ok(self.apply(walker, SampleBody::Descriptor(view)))
     }
 
-    /// Takes in a sample, a tenth of a second after the one before; answers how long it took \[µs\].
+    /// Takes in a sample, a tenth of a second after the one before; answers how long it took
+    /// \[µs\].
     fn apply(&mut self, walker: &mut Walker, body: SampleBody) -> f64 {
         self.stamp_ns += 100_000_000;
         let stamp_ns = self.stamp_ns;
