@@ -307,11 +307,11 @@ mod tests {
     /// Single readings may be far beyond any bias.
     #[test]
     fn a_noisy_gyroscope_reads_its_bias_as_well_as_its_noise_lets_it() {
-        let noisy = |k: u32| 0.01 + 0.05 * (f64::from(k) * 12.9898).sin();
+        let noisy = |k: u32| 0.008 + 0.03 * (f64::from(k) * 2.399_963).sin();
         let bias = read(600, noisy, 0.0, 0.5).unwrap();
-        let off = (bias.rate_rad_s.z - 0.01).abs();
+        let off = (bias.rate_rad_s.z - 0.008).abs();
         assert!(
-            off < 3.0 * bias.variance.z.sqrt() && off < 0.003,
+            off < 3.0 * bias.variance.z.sqrt() && off < 0.001,
             "{bias:?}"
         );
     }
