@@ -34,7 +34,7 @@ const CORE: [(&str, &[&str]); 10] = [
         "pose_graph",
         &["geometry", "nalgebra", "pulp", "state", "thiserror"],
     ),
-    ("place_filter", &["geometry", "nalgebra", "state"]),
+    ("place_filter", &["geometry", "nalgebra", "pulp", "state"]),
     (
         "place_recognition",
         &["geometry", "nalgebra", "random", "state"],

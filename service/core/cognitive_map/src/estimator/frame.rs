@@ -255,8 +255,9 @@ impl Frame {
         }
     }
 
-    /// From the first landmark on that it sees with its direction it is not taken for granted that a
-    /// member drives straight: only such landmarks tell that in time. What views say of it comes with the past.
+    /// From the first landmark on that a member sees with its direction it is not taken for granted
+    /// that it drives straight: only such landmarks tell that in time. What views say of it comes
+    /// with the past.
     pub(super) fn begin_veer(&mut self, index: usize, parameters: &Parameters) {
         let component = self.members[index].offset + BODY_DIM - LASTING_DIM + VEER;
         let sd = parameters.calibration_sd()[VEER];

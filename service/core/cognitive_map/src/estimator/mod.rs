@@ -39,6 +39,7 @@ mod agent_sighting;
 mod agent_slot;
 mod associations;
 mod assumed_noise;
+mod bias_measurement;
 mod calibration;
 mod covariance;
 mod effect;

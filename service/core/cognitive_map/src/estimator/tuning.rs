@@ -204,8 +204,8 @@ pub(super) const CIRCLE_VARIANCE_MAX: f64 = 30.0;
 /// Landmarks of which an agent knows distances alone. Source: memory; each has up to 576 places of
 /// 104 bytes.
 pub(super) const RANGED_MAX: usize = 32;
-/// Most places where one of them may be. Source: twice those by one distance, for the first ones may
-/// have been those of reflections.
+/// Most places where one of them may be. Source: twice those by one distance, for the first ones
+/// may have been those of reflections.
 pub(super) const RANGE_POINTS_MAX: usize = {
     let rings = (RANGE_LAYERS * RANGE_RING_POINTS) as usize;
     let sphere = RANGE_SPHERE_POINTS as usize;
