@@ -143,8 +143,8 @@ impl RangeHypotheses {
     }
 
     /// All distances before this one may have been those of reflections: adds the places where the
-    /// landmark may be by this one alone, as far as that is probable beside the others. None of
-    /// them may have been shorter than reflections are.
+    /// landmark may be by this one alone, as far as that is probable beside the others. Reflected
+    /// distances are too long, so this one is no longer than they admit.
     fn suppose_reflections(&mut self, range: &Range, variance: f64, is_planar: bool) {
         let log_density = (RANGE_REFLECTED / RANGE_REFLECTION_MAX_M).ln();
         let log_mass = f64::from(self.taken) * log_density - self.log_evidence;

@@ -90,7 +90,7 @@ impl Standing {
             return None;
         }
         let crept_m_s = (self.stood.went_m / self.stood.time_s).max(STANDING_CREEP_M_S);
-        if length_m >= STANDING_CONTRAST * crept_m_s * duration_s {
+        if duration_s > 0.0 && length_m >= STANDING_CONTRAST * crept_m_s * duration_s {
             return std::mem::take(self).measured();
         }
         self.since_m += length_m;
@@ -240,6 +240,14 @@ mod tests {
             "it reads next to nothing"
         );
         assert_eq!(read(5, |_| 0.006, 0.0, 0.5), None, "it hardly stopped");
+        // Of a motion of no duration nobody knows how fast it was.
+        let mut standing = Standing::default();
+        for _ in 0..200 {
+            assert_eq!(go(&mut standing, 0.0, 0.006), None);
+        }
+        let step = Motion::from_increment([0.5, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], None).unwrap();
+        let step = OdometryReading::new(&step, 0.0);
+        assert_eq!(standing.take_in(&step, 0.0, 0.004), None);
         // One turn among the seconds ends the stand before it.
         let once = |k: u32| if (100..120).contains(&k) { 0.2 } else { 0.006 };
         let bias = read(200, once, 0.0, 0.5).unwrap();
