@@ -365,6 +365,8 @@ pub(crate) mod similarity {
     pub(crate) const COARSE_SPACINGS: f64 = 3.0;
     /// Ranges within which views are matched by a map that has been relaxed.
     pub(crate) const GATE_RANGES: f64 = 6.0;
+    /// The same by a map that is right but for its details: views farther apart share nothing.
+    pub(crate) const CLOSE_RANGES: f64 = 2.0;
     /// Bounds of the depth of a match: logarithm of its odds.
     pub(crate) const DEPTH: (f64, f64) = (0.05, 6.0);
 }

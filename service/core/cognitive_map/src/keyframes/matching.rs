@@ -16,6 +16,8 @@ pub(super) struct Matching {
     pub(super) keyframes_max: usize,
     /// Widths of the kernels of matches, in their ranges, one relaxation each.
     pub(super) widths: &'static [f64],
+    /// How often the views are matched once more, close to where the best map has them.
+    pub(super) close_matchings: usize,
     /// Whether views without matches are matched only if the new ones resemble others more than
     /// those before them did.
     pub(super) needs_news: bool,

@@ -218,6 +218,7 @@ pub(super) const LIVE_MATCHING: Matching = Matching {
     views_max: 1024,
     keyframes_max: 1024,
     widths: &[4.0, 2.0, 1.0],
+    close_matchings: 0,
     needs_news: true,
     veers: &[],
 };
@@ -227,6 +228,7 @@ pub(super) const LIVE_MATCHING: Matching = Matching {
 pub(super) const LIVE_MATCHING_ANEW: Matching = Matching {
     views_max: 512,
     keyframes_max: 1024,
+    close_matchings: 0,
     ..REFINED_MATCHING
 };
 
@@ -236,6 +238,7 @@ pub(super) const REFINED_MATCHING: Matching = Matching {
     views_max: usize::MAX,
     keyframes_max: 8192,
     widths: &[32.0, 16.0, 8.0, 4.0, 2.0, 1.0],
+    close_matchings: 2,
     needs_news: false,
     veers: &[0.0, -1.0, 1.0, -2.0, 2.0],
 };
@@ -251,6 +254,9 @@ pub(super) const THINNED_STEP_MAX_M: f64 = 1e3;
 /// Widths of kernels where views are matched near to where a relaxed map has them, and how often.
 pub(super) const GATED_WIDTHS: &[f64] = &[4.0, 2.0, 1.0];
 pub(super) const GATED_MATCHINGS: usize = 2;
+
+/// The same widths where they are matched close to where the best map has them.
+pub(super) const CLOSE_WIDTHS: &[f64] = &[2.0, 1.0];
 
 /// Standard deviation of the veer that is expected \[rad/m\]: wheels whose diameters differ by a
 /// part in a hundred, half a metre apart.

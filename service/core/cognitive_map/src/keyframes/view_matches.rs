@@ -34,6 +34,9 @@ impl RelaxationCopy {
     /// criterion of a fold: it has three degrees of freedom, and of many folds that are possible
     /// one is always the most probable.
     ///
+    /// The best map may have its views matched once more, closely ([`Matching`]), as long as that
+    /// loses less than half of what tells two maps apart.
+    ///
     /// Beyond the most keyframes of [`Matching`], maps are compared by some of them, evenly spaced.
     /// Those between move with the one before.
     pub(super) fn match_views(&mut self, log: &ViewLog, matching: &Matching) -> bool {
@@ -84,6 +87,13 @@ impl RelaxationCopy {
         }
         if before.is_empty() && best.copy.graph().matches.is_empty() {
             return before != held;
+        }
+        let least = needed.max(best.log_probability - 0.5 * another_map);
+        for _ in 0..matching.close_matchings {
+            match best.matched_closely(&channels) {
+                Some(closer) if closer.log_probability > least => best = closer,
+                _ => break,
+            }
         }
         self.adopt_thinned(&best.copy);
         self.graph().matches != held
@@ -153,6 +163,22 @@ impl RelaxationCopy {
             }
         }
         copy
+    }
+}
+
+impl Matched {
+    /// The same, relaxed by matches that are close to one another by it; `None` if it has none.
+    fn matched_closely(&self, channels: &[Similarity<'_>]) -> Option<Self> {
+        let graph = self.copy.graph();
+        if graph.matches.is_empty() {
+            return None;
+        }
+        let close = |channel: &Similarity<'_>| channel.matches_close(&positions(graph, channel));
+        let close: Vec<ViewMatch> = channels.iter().flat_map(close).collect();
+        (!close.is_empty()).then(|| {
+            self.copy
+                .with_matches(close.into(), tuning::CLOSE_WIDTHS, channels)
+        })
     }
 }
 

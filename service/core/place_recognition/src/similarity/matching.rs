@@ -173,7 +173,23 @@ impl<'a> Similarity<'a> {
 
     /// The match of each view with another one, earlier or later, near to which a map has it.
     pub fn matches_near(&self, positions: &[Option<Point3<f64>>]) -> Vec<ViewMatch> {
-        let gate_m = tuning::GATE_RANGES * self.learned.range_m;
+        self.matches_within(tuning::GATE_RANGES, 1, positions)
+    }
+
+    /// The matches of each view with others, earlier or later, close to which a map has it that is
+    /// right but for its details.
+    pub fn matches_close(&self, positions: &[Option<Point3<f64>>]) -> Vec<ViewMatch> {
+        self.matches_within(tuning::CLOSE_RANGES, tuning::MATCHES, positions)
+    }
+
+    /// At most so many matches of each view with others that a map has within so many ranges.
+    fn matches_within(
+        &self,
+        ranges: f64,
+        most: usize,
+        positions: &[Option<Point3<f64>>],
+    ) -> Vec<ViewMatch> {
+        let gate_m = ranges * self.learned.range_m;
         let mut matches = Vec::new();
         for (index, position) in positions.iter().enumerate() {
             let Some(position) = position else {
@@ -185,7 +201,7 @@ impl<'a> Similarity<'a> {
             });
             let candidates: Vec<usize> = candidates.map(|(other, _)| other).collect();
             let nowhere = tuning::NOWHERE * candidates.len() as f64;
-            self.best(index, candidates, nowhere, 1, &mut matches);
+            self.best(index, candidates, nowhere, most, &mut matches);
         }
         matches
     }

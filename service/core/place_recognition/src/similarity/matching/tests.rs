@@ -1,4 +1,4 @@
-//! News: views that resemble earlier ones more than those before them did.
+//! Matches of views, and news: views that resemble earlier ones more than those before them did.
 
 use nalgebra::Isometry3;
 
@@ -139,6 +139,40 @@ fn views_are_recognised_where_few_of_them_are_matched() {
     let again = (400..800).step_by(4).filter_map(best).filter(is_true);
     let n_true = again.count();
     assert!(n_true >= 95, "{n_true} of 100");
+}
+
+#[test]
+fn close_matches_are_the_best_among_views_that_a_map_has_close() {
+    let once: Vec<f64> = (0..200).map(|number| 0.4 * f64::from(number)).collect();
+    let thrice = [once.as_slice(), once.as_slice(), once.as_slice()].concat();
+    let log = log_of(&thrice, 0);
+    let channels = Similarity::of_channels(&log, 1024);
+    assert_eq!(channels.len(), 1, "views of one channel that say something");
+    let channel = &channels[0];
+    let range_m = channel.learned().range_m;
+    let map = |shift_m: f64| -> Vec<Option<Point3<f64>>> {
+        // The third time along the corridor lies beside it.
+        let shift = |index: usize| if index < 400 { 0.0 } else { shift_m };
+        let points = thrice.iter().enumerate();
+        points
+            .map(|(index, at)| Some(Point3::new(*at, shift(index), 0.0)))
+            .collect()
+    };
+    let index = |sample: SampleKey| usize::try_from(sample.seq).unwrap();
+    let apart_m = |one: &ViewMatch| (thrice[index(one.now)] - thrice[index(one.then)]).abs();
+    // A view has one match in each of the other two times along.
+    let matches = channel.matches_close(&map(0.0));
+    assert!((1000..=1200).contains(&matches.len()), "{}", matches.len());
+    assert!(matches.iter().all(|one| apart_m(one) < 2.0 * range_m));
+    let n_true = matches.iter().filter(|one| apart_m(one) < 0.9).count();
+    assert!(n_true >= 950, "{n_true} of {}", matches.len());
+    // What a map has beyond two ranges is matched by those that look farther, not closely.
+    let beside = map(2.5 * range_m);
+    let is_third = |one: &ViewMatch| (index(one.now) < 400) != (index(one.then) < 400);
+    assert!(!channel.matches_close(&beside).iter().any(is_third));
+    let near = channel.matches_near(&beside);
+    assert!(near.iter().filter(|one| is_third(one)).count() > 100);
+    assert!(channel.matches_close(&vec![None; thrice.len()]).is_empty());
 }
 
 #[test]
