@@ -1,4 +1,4 @@
-//! Matches of views, and news: views that resemble earlier ones more than those before them did.
+//! Matches of views, and news: views that resemble earlier ones more than those before did.
 
 use nalgebra::Isometry3;
 
