@@ -1,6 +1,6 @@
 //! What the similarity of two views says of the distance between them.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::tuning::channel as tuning;
 use state::{Codec, CorruptState, Moments, State, StateReader, StateWriter, state_of_struct};
@@ -128,11 +128,26 @@ impl ChannelModel {
             .filter(|reach_m| *reach_m > 0.0)
     }
 
-    /// The distance between two views; `None` if they are no more similar than unrelated ones.
-    pub(crate) fn distance(&self, angle_rad: f64) -> Option<Distance> {
+    /// Angle up to which views are more similar than unrelated ones \[rad\], once that is known.
+    fn similar_rad(&self) -> Option<f64> {
         let unrelated = &self.unrelated;
         let is_known = unrelated.count() >= tuning::UNRELATED_MIN;
-        if !is_known || angle_rad > unrelated.mean() - tuning::SIMILAR_SD * unrelated.sd() {
+        is_known.then(|| unrelated.mean() - tuning::SIMILAR_SD * unrelated.sd())
+    }
+
+    /// Least cosine of two views that are more similar than unrelated ones, once that is known.
+    pub(crate) fn similar_cosine(&self) -> Option<f32> {
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "rounding errors are allowed for"
+        )]
+        let cosine = |angle_rad: f64| angle_rad.clamp(0.0, PI).cos() as f32;
+        self.similar_rad().map(cosine)
+    }
+
+    /// The distance between two views; `None` if they are no more similar than unrelated ones.
+    pub(crate) fn distance(&self, angle_rad: f64) -> Option<Distance> {
+        if angle_rad > self.similar_rad()? {
             return None;
         }
         let known = |class: usize| {
