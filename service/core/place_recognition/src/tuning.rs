@@ -48,8 +48,10 @@ pub(crate) mod memory {
     pub(crate) const VIEWS_MAX: usize = 16_384;
     /// Most numbers in their descriptors, all of which a new view is compared with: 8 MiB.
     pub(crate) const NUMBERS_MAX: usize = 1 << 21;
-    /// Most of them from which a new view learns what unrelated ones are like: eight views turn
-    /// over what counts.
+    /// Most views with all of which a new one is compared.
+    pub(crate) const COMPARED: usize = 2048;
+    /// Of more, those from which it learns what unrelated views are like: their mean is known to a
+    /// twentieth of a deviation.
     pub(crate) const DRAWN: usize = 512;
     /// Least motion between two views that are compared \[m, rad\].
     pub(crate) const MOVED: (f64, f64) = (0.05, 0.1);

@@ -125,14 +125,14 @@ impl ViewMemory {
     /// The similar earlier views, by number, with their distances; and whether one of them makes
     /// the view redundant.
     ///
-    /// What unrelated views are like is learned from some of all, spread evenly, others with each
-    /// view: the cost does not grow with their number. Of the rest only those are looked at that
-    /// may be similar.
+    /// A few are all compared. What unrelated views are like is learned from some of many, spread
+    /// evenly, others with each view, and each for as many as are not: that costs the same of any
+    /// number. Of the rest only those are looked at that may be similar.
     fn similar_earlier(&mut self, view: &StoredView) -> (Vec<(usize, Distance)>, bool) {
         let model = &mut self.channels[usize::from(view.channel)];
         let mut similar = Vec::new();
         let mut is_known = false;
-        let mut compare = |model: &mut ChannelModel, number: usize, is_drawn: bool| {
+        let mut compare = |model: &mut ChannelModel, number: usize, pairs: u32| {
             let Some(other) = self.stored.get(number) else {
                 return;
             };
@@ -143,8 +143,8 @@ impl ViewMemory {
                 return;
             }
             let angle_rad = angle_rad(&other.vector, &view.vector);
-            if is_drawn {
-                model.learn_unrelated(angle_rad);
+            if pairs > 0 {
+                model.learn_unrelated(angle_rad, pairs);
             }
             if let Some(distance) = model.distance(angle_rad) {
                 // A similar view somewhere else does not make it redundant.
@@ -154,16 +154,20 @@ impl ViewMemory {
                 similar.push((number, distance));
             }
         };
-        let stride = self.stored.len().div_ceil(tuning::DRAWN).max(1);
+        let stride = match self.stored.len() {
+            0..=tuning::COMPARED => 1,
+            count => count.div_ceil(tuning::DRAWN),
+        };
         let first = view.ordinal as usize % stride;
+        let pairs = u32::try_from(stride).unwrap_or(u32::MAX);
         for number in (first..self.stored.len()).step_by(stride) {
-            compare(model, number, true);
+            compare(model, number, pairs);
         }
         if let (2.., Some(cosine)) = (stride, model.similar_cosine()) {
             let alike = self.index.alike(view.channel, &view.vector, cosine, 0);
             for number in alike {
                 if number % stride != first {
-                    compare(model, number, false);
+                    compare(model, number, 0);
                 }
             }
             similar.sort_by_key(|(number, _)| *number);

@@ -218,16 +218,17 @@ impl Block {
     }
 }
 
-/// Scalar product of two coarse vectors.
+/// Scalar product of two coarse vectors: no sum of at most 4096 products is too large for it, and
+/// without checks of that the compiler may use vector registers.
 #[expect(
     clippy::inline_always,
     reason = "compiled for the vectors of a dispatch"
 )]
 #[inline(always)]
 fn product(a: &[i16], b: &[i8]) -> i32 {
-    { a.iter().zip(b) }
-        .map(|(a, b)| i32::from(*a) * i32::from(*b))
-        .sum()
+    a.iter().zip(b).fold(0, |sum: i32, (a, b)| {
+        sum.wrapping_add(i32::from(*a).wrapping_mul(i32::from(*b)))
+    })
 }
 
 #[cfg(test)]

@@ -53,15 +53,19 @@ impl ChannelModel {
         }
     }
 
-    /// Learns from two views that are far from one another along the way.
-    pub(crate) fn learn_unrelated(&mut self, angle_rad: f64) {
+    /// Learns from two views that are far from one another along the way, which stand for so many
+    /// pairs: they count as if each of these had the angle.
+    pub(crate) fn learn_unrelated(&mut self, angle_rad: f64, pairs: u32) {
+        const KEPT: f64 = 1.0 - 1.0 / tuning::UNRELATED;
         let unrelated = &mut self.unrelated;
         let is_known = unrelated.count() >= tuning::UNRELATED_MIN;
         if is_known && angle_rad < unrelated.mean() - tuning::RELATED * unrelated.sd() {
             return;
         }
-        unrelated.fade(1.0 - 1.0 / tuning::UNRELATED);
-        unrelated.add(angle_rad, 1.0);
+        let kept = (1..pairs).fold(KEPT, |kept, _| kept * KEPT);
+        unrelated.fade(kept);
+        // Σ KEPTᵏ of these pairs
+        unrelated.add(angle_rad, (1.0 - kept) / (1.0 - KEPT));
     }
 
     /// Angle beyond which a view is new beside another \[rad\].
@@ -236,7 +240,7 @@ mod tests {
         for step in 0..4000_u32 {
             let distance_m = f64::from(step % 100) * 0.015;
             model.learn(distance_m, distance_m);
-            model.learn_unrelated(1.5 + 0.1 * (f64::from(step) * 0.7).sin());
+            model.learn_unrelated(1.5 + 0.1 * (f64::from(step) * 0.7).sin(), 1);
         }
         model
     }

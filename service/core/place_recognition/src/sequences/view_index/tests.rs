@@ -71,10 +71,7 @@ fn a_vector_of_zeros_is_like_none_and_breaks_nothing() {
     let mut views = views(3, &mut draws);
     views[0].vector = vec![0.0; NUMBERS].into();
     let index = ViewIndex::of(views.iter(), 1);
-    assert_eq!(
-        index.alike(0, &vec![0.0; NUMBERS], 0.5, 0),
-        Vec::<usize>::new()
-    );
+    assert_eq!(index.alike(0, &[0.0; NUMBERS], 0.5, 0), Vec::<usize>::new());
     assert_eq!(index.alike(0, &views[1].vector, 0.9, 0), [1]);
 }
 
