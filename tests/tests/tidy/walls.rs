@@ -37,7 +37,7 @@ const CORE: [(&str, &[&str]); 10] = [
     ("place_filter", &["geometry", "nalgebra", "pulp", "state"]),
     (
         "place_recognition",
-        &["geometry", "nalgebra", "random", "state"],
+        &["geometry", "nalgebra", "pulp", "random", "state"],
     ),
     (
         "object_recognition",

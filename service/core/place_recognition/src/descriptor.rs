@@ -1,12 +1,27 @@
 //! Similarity of two descriptors.
 
+use pulp::Arch;
+
 /// Sums of a scalar product that grow side by side, so that the compiler may use vector registers:
 /// a single sum has an order of additions that it has to keep.
 const LANES: usize = 16;
 
-/// Scalar product of two vectors of one length.
+/// Scalar product of two vectors of one length, in the widest vectors of the machine: the sums are
+/// the same in any.
 #[inline]
 pub fn dot(a: &[f32], b: &[f32]) -> f32 {
+    Arch::new().dispatch(
+        #[inline(always)]
+        || dot_inline(a, b),
+    )
+}
+
+#[expect(
+    clippy::inline_always,
+    reason = "compiled for the vectors of a dispatch"
+)]
+#[inline(always)]
+fn dot_inline(a: &[f32], b: &[f32]) -> f32 {
     let (a, a_rest) = a.as_chunks::<LANES>();
     let (b, b_rest) = b.as_chunks::<LANES>();
     let mut sums = [0.0; LANES];

@@ -90,16 +90,20 @@ pub(super) fn kernel_matrices(
     if count == 0 {
         return None;
     }
-    let matrix = DMatrix::from_fn(count, count, |row, column| {
-        if row == column {
-            1.0 + tuning::OPEN_MIN
-        } else {
-            kernel.at((near[row].at - near[column].at).norm_squared())
+    let mut matrix = DMatrix::from_diagonal_element(count, count, 1.0 + tuning::OPEN_MIN);
+    let mut gram = DMatrix::zeros(count, count);
+    for column in 0..count {
+        for row in column..count {
+            let (one, other) = (near[row], near[column]);
+            // Both are the same either way round.
+            let product = cosine(one.vector, other.vector);
+            (gram[(row, column)], gram[(column, row)]) = (product, product);
+            if row != column {
+                let known = kernel.at((one.at - other.at).norm_squared());
+                (matrix[(row, column)], matrix[(column, row)]) = (known, known);
+            }
         }
-    });
-    let gram = DMatrix::from_fn(count, count, |row, column| {
-        cosine(near[row].vector, near[column].vector)
-    });
+    }
     Some((matrix.cholesky()?.inverse(), gram))
 }
 

@@ -91,7 +91,7 @@ impl PlaceRecognition {
     /// # Errors
     /// The bytes are no such head.
     pub fn read_head(&mut self, input: &mut StateReader<'_>) -> Result<(), CorruptState> {
-        self.views.read_head(input)
+        self.views.read_head(input, self.revision)
     }
 
     /// Reads what the log of views has in no page.

@@ -6,7 +6,7 @@
 //! agent may be does it count as kidnapped.
 
 use geometry::se3::twist;
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 
 use super::PlaceRecognition;
 use crate::appearance::{DescriptorProcess, LocalQuery, Prior, ReferenceView, log_odds};
@@ -91,10 +91,9 @@ impl PlaceRecognition {
     ) -> Option<f64> {
         let at = Point3::from(view.pose.translation.vector);
         let mut near: Vec<(ReferenceView<'_>, Isometry3<f64>)> = Vec::new();
-        let mut remembered: Vec<_> = self
-            .views
-            .stored
-            .iter()
+        // Rounding errors leave none out.
+        let about = Vector3::repeat(kernel.length_m * (1.0 + 1e-9));
+        let mut remembered: Vec<_> = { self.views.within([at - about, at + about]) }
             .filter(|stored| stored.channel == query.channel && !test.run.is_own(stored))
             .map(|stored| ((stored.in_map - at).norm_squared(), stored))
             .filter(|(squared, _)| *squared <= kernel.length_m.powi(2))

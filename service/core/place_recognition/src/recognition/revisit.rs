@@ -127,9 +127,7 @@ impl PlaceRecognition {
             matched.now.in_odom.inverse(),
             matched.then.in_odom.inverse(),
         );
-        let earlier = self.views.stored.iter();
-        let views: ReferenceViews<'a> = earlier
-            .filter(|view| matched.is_beside(view))
+        let views: ReferenceViews<'a> = { self.views.beside(matched) }
             .map(|view| {
                 let at = then * Point3::from(view.in_odom.translation.vector);
                 let vector = &*view.vector;

@@ -57,9 +57,9 @@ fn views<'a>(
     let is_within = |point: &Point3<f64>, more_m: f64| {
         (0..3).all(|k| point[k] >= low[k] - more_m && point[k] <= high[k] + more_m)
     };
-    let views = memory.stored.iter();
-    let near =
-        views.filter(|view| is_within(&view.in_map, tuning::DISPLACED_M) && !search.is_own(view));
+    let more = Vector3::repeat(tuning::DISPLACED_M);
+    let near = { memory.within([low - more, high + more]) }
+        .filter(|view| is_within(&view.in_map, tuning::DISPLACED_M) && !search.is_own(view));
     near.filter_map(|view| {
         let at = positions.at(view.sample)?;
         let vector = &*view.vector;

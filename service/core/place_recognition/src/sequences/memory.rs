@@ -1,9 +1,10 @@
 //! The memory of views, and the sequence matches among them.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 
 use super::sequence_match::SequenceMatch;
 use super::track::ViewTrack;
+use super::view_index::ViewIndex;
 use crate::descriptor::angle_rad;
 use crate::keyframes::SampleKey;
 use crate::similarity::{LoggedView, ViewLog, logged};
@@ -18,6 +19,8 @@ pub(crate) struct ViewMemory {
     pub(crate) channels: Vec<ChannelModel>,
     pub(crate) tracks: PagedVec<ViewTrack, 1>,
     pub(crate) stored: PagedVec<StoredView, 16>,
+    /// Where to look for them; derived.
+    index: ViewIndex,
     /// Numbers in all descriptors.
     numbers: u64,
     /// All views of agents of the map.
@@ -121,19 +124,28 @@ impl ViewMemory {
 
     /// The similar earlier views, by number, with their distances; and whether one of them makes
     /// the view redundant.
+    ///
+    /// A few are all compared. What unrelated views are like is learned from some of many, spread
+    /// evenly, others with each view, and each for as many as are not: that costs the same of any
+    /// number. Of the rest only those are looked at that may be similar.
     fn similar_earlier(&mut self, view: &StoredView) -> (Vec<(usize, Distance)>, bool) {
         let model = &mut self.channels[usize::from(view.channel)];
         let mut similar = Vec::new();
         let mut is_known = false;
-        for (number, other) in self.stored.iter().enumerate() {
+        let mut compare = |model: &mut ChannelModel, number: usize, pairs: u32| {
+            let Some(other) = self.stored.get(number) else {
+                return;
+            };
             let is_recent = other.sample.agent == view.sample.agent
                 && other.sample.session == view.sample.session
                 && other.ordinal.saturating_add(tuning::EARLIER) >= view.ordinal;
             if other.channel != view.channel || is_recent {
-                continue;
+                return;
             }
             let angle_rad = angle_rad(&other.vector, &view.vector);
-            model.learn_unrelated(angle_rad);
+            if pairs > 0 {
+                model.learn_unrelated(angle_rad, pairs);
+            }
             if let Some(distance) = model.distance(angle_rad) {
                 // A similar view somewhere else does not make it redundant.
                 let apart_m = (other.in_map - view.in_map).norm();
@@ -141,6 +153,24 @@ impl ViewMemory {
                 is_known |= angle_rad < model.news_rad() && apart_m <= distance.mean_m + unsure_m;
                 similar.push((number, distance));
             }
+        };
+        let stride = match self.stored.len() {
+            0..=tuning::COMPARED => 1,
+            count => count.div_ceil(tuning::DRAWN),
+        };
+        let first = view.ordinal as usize % stride;
+        let pairs = u32::try_from(stride).unwrap_or(u32::MAX);
+        for number in (first..self.stored.len()).step_by(stride) {
+            compare(model, number, pairs);
+        }
+        if let (2.., Some(cosine)) = (stride, model.similar_cosine()) {
+            let alike = self.index.alike(view.channel, &view.vector, cosine, 0);
+            for number in alike {
+                if number % stride != first {
+                    compare(model, number, 0);
+                }
+            }
+            similar.sort_by_key(|(number, _)| *number);
         }
         if similar.len() > tuning::SIMILAR_MAX {
             similar.sort_by(|a, b| a.1.mean_m.total_cmp(&b.1.mean_m).then(a.0.cmp(&b.0)));
@@ -209,6 +239,7 @@ impl ViewMemory {
     /// Remembers a view; every second one is forgotten when there is no room for it.
     fn remember(&mut self, view: StoredView, revision: u64) {
         self.numbers += view.vector.len() as u64;
+        self.index.push(&view, revision);
         self.stored.push(view, revision);
         if self.stored.len() <= tuning::VIEWS_MAX && self.numbers <= tuning::NUMBERS_MAX as u64 {
             return;
@@ -261,12 +292,14 @@ impl ViewMemory {
         }
         // Later views have changed their numbers.
         self.thinnings += 1;
-        self.count_numbers();
+        self.derive(revision);
     }
 
-    fn count_numbers(&mut self) {
+    /// Derives what follows from the stored views.
+    fn derive(&mut self, revision: u64) {
         let views = self.stored.iter();
         self.numbers = views.map(|view| view.vector.len() as u64).sum();
+        self.index = ViewIndex::of(self.stored.iter(), revision);
     }
 
     /// The number of a descriptor's channel; a new one if there is room for it.
@@ -311,7 +344,8 @@ impl ViewMemory {
             numbers.sum::<usize>()
         });
         let recent: usize = recent.sum();
-        self.stored.bytes() + self.tracks.bytes() + self.log.bytes() + 4 * (numbers + recent)
+        let pages = self.stored.bytes() + self.tracks.bytes() + self.log.bytes();
+        pages + self.index.bytes() + 4 * (numbers + recent)
     }
 
     pub(crate) fn write_head(&self, out: &mut StateWriter) {
@@ -319,10 +353,15 @@ impl ViewMemory {
         self.thinnings.write(out);
     }
 
-    pub(crate) fn read_head(&mut self, input: &mut StateReader<'_>) -> Result<(), CorruptState> {
+    /// Reads what [`write_head`](Self::write_head) wrote, after all pages.
+    pub(crate) fn read_head(
+        &mut self,
+        input: &mut StateReader<'_>,
+        revision: u64,
+    ) -> Result<(), CorruptState> {
         self.channels = Counted::<u64>::read(input)?;
         self.thinnings = State::read(input)?;
-        self.count_numbers();
+        self.derive(revision);
         Ok(())
     }
 
@@ -334,9 +373,12 @@ impl ViewMemory {
         from: usize,
         is_left_out: impl Fn(&StoredView) -> bool,
     ) -> Vec<SimilarView> {
-        let views = self.stored.iter_from(from);
-        let mut similar: Vec<SimilarView> = views
-            .filter(|view| view.channel == channel && !is_left_out(view))
+        let model = self.channels.get(usize::from(channel));
+        let cosine = model.and_then(ChannelModel::similar_cosine);
+        let alike = cosine.map(|cosine| self.index.alike(channel, vector, cosine, from));
+        let mut similar: Vec<SimilarView> = { alike.unwrap_or_default().into_iter() }
+            .filter_map(|number| self.stored.get(number))
+            .filter(|view| !is_left_out(view))
             .filter_map(|view| {
                 Some(SimilarView {
                     sample: view.sample,
@@ -347,6 +389,19 @@ impl ViewMemory {
         similar.sort_by(|a, b| a.distance.mean_m.total_cmp(&b.distance.mean_m));
         similar.truncate(tuning::SIMILAR_MAX);
         similar
+    }
+
+    /// The views that were stored within the corners of a box \[m\], and some beside it, in order.
+    pub(crate) fn within(&self, corners: [Point3<f64>; 2]) -> impl Iterator<Item = &StoredView> {
+        let numbers = self.index.within(corners);
+        numbers.filter_map(|number| self.stored.get(number))
+    }
+
+    /// The views of the earlier stretch of a match, or beside it, in order.
+    pub(crate) fn beside(&self, matched: &SequenceMatch) -> impl Iterator<Item = &StoredView> {
+        let numbers = self.index.among(matched.ordinals());
+        let views = numbers.filter_map(|number| self.stored.get(number));
+        views.filter(|view| matched.is_beside(view))
     }
 
     /// Whether two views of a channel are more similar than unrelated ones.

@@ -10,6 +10,7 @@ mod memory;
 mod range_alignment;
 mod sequence_match;
 mod track;
+mod view_index;
 
 pub(crate) use memory::ViewMemory;
 pub(crate) use range_alignment::{Range, align_roughly, equations};

@@ -1,5 +1,7 @@
 //! A sequence match: pairs of similar views of two stretches of way.
 
+use std::ops::RangeInclusive;
+
 use nalgebra::{Isometry3, Point3};
 
 use crate::keyframes::SampleKey;
@@ -91,8 +93,12 @@ impl SequenceMatch {
     pub(super) fn leads_to(&self, then: &StoredView) -> bool {
         self.then.sample.agent == then.sample.agent
             && self.then.sample.session == then.sample.session
-            && then.ordinal <= self.high.saturating_add(tuning::GAP_MAX)
-            && then.ordinal.saturating_add(tuning::GAP_MAX) >= self.low
+            && self.ordinals().contains(&then.ordinal)
+    }
+
+    /// Ordinals of the earlier stretch, and of those views that continue it.
+    pub(super) fn ordinals(&self) -> RangeInclusive<u32> {
+        self.low.saturating_sub(tuning::GAP_MAX)..=self.high.saturating_add(tuning::GAP_MAX)
     }
 
     /// Adds a pair.

@@ -1,6 +1,6 @@
 //! What the similarity of two views says of the distance between them.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::tuning::channel as tuning;
 use state::{Codec, CorruptState, Moments, State, StateReader, StateWriter, state_of_struct};
@@ -53,15 +53,19 @@ impl ChannelModel {
         }
     }
 
-    /// Learns from two views that are far from one another along the way.
-    pub(crate) fn learn_unrelated(&mut self, angle_rad: f64) {
+    /// Learns from two views that are far from one another along the way, which stand for so many
+    /// pairs: they count as if each of these had the angle.
+    pub(crate) fn learn_unrelated(&mut self, angle_rad: f64, pairs: u32) {
+        const KEPT: f64 = 1.0 - 1.0 / tuning::UNRELATED;
         let unrelated = &mut self.unrelated;
         let is_known = unrelated.count() >= tuning::UNRELATED_MIN;
         if is_known && angle_rad < unrelated.mean() - tuning::RELATED * unrelated.sd() {
             return;
         }
-        unrelated.fade(1.0 - 1.0 / tuning::UNRELATED);
-        unrelated.add(angle_rad, 1.0);
+        let kept = (1..pairs).fold(KEPT, |kept, _| kept * KEPT);
+        unrelated.fade(kept);
+        // Σ KEPTᵏ of these pairs
+        unrelated.add(angle_rad, (1.0 - kept) / (1.0 - KEPT));
     }
 
     /// Angle beyond which a view is new beside another \[rad\].
@@ -128,11 +132,26 @@ impl ChannelModel {
             .filter(|reach_m| *reach_m > 0.0)
     }
 
-    /// The distance between two views; `None` if they are no more similar than unrelated ones.
-    pub(crate) fn distance(&self, angle_rad: f64) -> Option<Distance> {
+    /// Angle up to which views are more similar than unrelated ones \[rad\], once that is known.
+    fn similar_rad(&self) -> Option<f64> {
         let unrelated = &self.unrelated;
         let is_known = unrelated.count() >= tuning::UNRELATED_MIN;
-        if !is_known || angle_rad > unrelated.mean() - tuning::SIMILAR_SD * unrelated.sd() {
+        is_known.then(|| unrelated.mean() - tuning::SIMILAR_SD * unrelated.sd())
+    }
+
+    /// Least cosine of two views that are more similar than unrelated ones, once that is known.
+    pub(crate) fn similar_cosine(&self) -> Option<f32> {
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "rounding errors are allowed for"
+        )]
+        let cosine = |angle_rad: f64| angle_rad.clamp(0.0, PI).cos() as f32;
+        self.similar_rad().map(cosine)
+    }
+
+    /// The distance between two views; `None` if they are no more similar than unrelated ones.
+    pub(crate) fn distance(&self, angle_rad: f64) -> Option<Distance> {
+        if angle_rad > self.similar_rad()? {
             return None;
         }
         let known = |class: usize| {
@@ -221,7 +240,7 @@ mod tests {
         for step in 0..4000_u32 {
             let distance_m = f64::from(step % 100) * 0.015;
             model.learn(distance_m, distance_m);
-            model.learn_unrelated(1.5 + 0.1 * (f64::from(step) * 0.7).sin());
+            model.learn_unrelated(1.5 + 0.1 * (f64::from(step) * 0.7).sin(), 1);
         }
         model
     }

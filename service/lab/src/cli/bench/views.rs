@@ -1,6 +1,7 @@
 //! `cogmap-lab bench views`.
 
 use std::hint::black_box;
+use std::thread::{self, Builder};
 use std::time::Instant;
 
 use clap::Args;
@@ -67,6 +68,8 @@ struct Report {
 #[derive(Debug, Serialize)]
 struct Row {
     views: u32,
+    /// What the map does with a view of the surveyor, while it grows.
+    surveying: Times,
     /// What the map does with a view of a robot that knows where it is.
     placed: Times,
     /// The same of a robot that does not, until it is found.
@@ -75,6 +78,8 @@ struct Row {
     scan_us_p50: f64,
     /// Robots that woke up and were found.
     found: u32,
+    /// What was learned while the surveyor went, which a service does on a thread of its own \[s\].
+    learning_s: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -103,18 +108,22 @@ pub(super) fn run(args: &ViewsArgs) -> anyhow::Result<()> {
         });
     }
     output::line(
-        "    views   placed p50 [µs]   p99 [µs]   lost p50 [µs]   p99 [µs]   scan p50 [µs]   found",
+        "    views   survey p50 [µs]   p99 [µs]   placed p50 [µs]   p99 [µs]   lost p50 [µs]   p99 [µs]\
+        \u{20}  scan p50 [µs]   found   learning [s]",
     )?;
     for row in rows {
         output::line(&format!(
-            "{:>9} {:>17.1} {:>10.1} {:>15.1} {:>10.1} {:>15.1} {:>7}",
+            "{:>9} {:>17.1} {:>10.1} {:>17.1} {:>10.1} {:>15.1} {:>10.1} {:>15.1} {:>7} {:>14.1}",
             row.views,
+            row.surveying.us_p50,
+            row.surveying.us_p99,
             row.placed.us_p50,
             row.placed.us_p99,
             row.lost.us_p50,
             row.lost.us_p99,
             row.scan_us_p50,
             row.found,
+            row.learning_s,
         ))?;
     }
     Ok(())
@@ -132,6 +141,9 @@ struct Survey {
     views: u32,
     agents: u32,
     stamp_ns: i64,
+    /// Times of the surveyor's views \[µs\].
+    surveying_us: Vec<f64>,
+    learning_s: f64,
 }
 
 /// Somebody who walks.
@@ -163,6 +175,8 @@ impl Survey {
             views,
             agents: 0,
             stamp_ns: 0,
+            surveying_us: Vec::new(),
+            learning_s: 0.0,
         };
         let mut surveyor = survey.walker(Vector3::zeros())?;
         survey.put(&mut surveyor)?;
@@ -175,7 +189,8 @@ impl Survey {
                 side - 1 - column
             };
             let to_m = Vector3::new(f64::from(column), f64::from(row), 0.0) * args.apart_m;
-            survey.step(&mut surveyor, &to_m)?;
+            let us = survey.step(&mut surveyor, &to_m)?;
+            survey.surveying_us.push(us);
         }
         Ok(survey)
     }
@@ -207,10 +222,12 @@ impl Survey {
         }
         Ok(Row {
             views: self.views,
+            surveying: Times::of(&mut self.surveying_us.clone()),
             placed: Times::of(&mut placed_us),
             lost: Times::of(&mut lost_us),
             scan_us_p50: self.clone().scan(args),
             found,
+            learning_s: self.learning_s,
         })
     }
 
@@ -273,7 +290,7 @@ impl Survey {
     }
 
     /// Takes in a sample, a tenth of a second after the one before; answers how long it took
-    /// \[µs\].
+    /// \[µs\], without what a thread of a service learns beside its writer.
     fn apply(&mut self, walker: &mut Walker, body: SampleBody) -> f64 {
         self.stamp_ns += 100_000_000;
         let stamp_ns = self.stamp_ns;
@@ -284,6 +301,16 @@ impl Survey {
             sample: Sample { stamp_ns, body },
         };
         walker.seq += 1;
+        if let Some(job) = self.map.relaxation().filter(|job| !job.is_done()) {
+            let start = Instant::now();
+            let relaxer = Builder::new().name("relaxer".into());
+            thread::scope(|scope| {
+                relaxer
+                    .spawn_scoped(scope, || job.run())
+                    .expect("the system can start a thread");
+            });
+            self.learning_s += start.elapsed().as_secs_f64();
+        }
         let mut events = Vec::new();
         let start = Instant::now();
         self.map.apply(&record, &mut events);
