@@ -46,12 +46,12 @@ pub(crate) mod memory {
     pub(crate) const CHANNELS_MAX: usize = 64;
     /// Most views.
     pub(crate) const VIEWS_MAX: usize = 16_384;
-    /// Most numbers in their descriptors, all of which a new view is compared with: 8 MiB.
+    /// Most numbers in their descriptors: 8 MiB.
     pub(crate) const NUMBERS_MAX: usize = 1 << 21;
-    /// Most views with all of which a new one is compared.
+    /// Most views of a channel with all of which a new one is compared.
     pub(crate) const COMPARED: usize = 2048;
-    /// Of more, those from which it learns what unrelated views are like: their mean is known to a
-    /// twentieth of a deviation.
+    /// Of more, the most from which it learns what unrelated views are like: their mean is known to
+    /// a sixteenth of a deviation.
     pub(crate) const DRAWN: usize = 512;
     /// Least motion between two views that are compared \[m, rad\].
     pub(crate) const MOVED: (f64, f64) = (0.05, 0.1);

@@ -125,9 +125,9 @@ impl ViewMemory {
     /// The similar earlier views, by number, with their distances; and whether one of them makes
     /// the view redundant.
     ///
-    /// A few are all compared. What unrelated views are like is learned from some of many, spread
-    /// evenly, others with each view, and each for as many as are not: that costs the same of any
-    /// number. Of the rest only those are looked at that may be similar.
+    /// A few of a channel are all compared. What unrelated views are like is learned from some of
+    /// many, spread evenly, others with each view, and each for as many as are not. Of the rest
+    /// only those are looked at that may be similar.
     fn similar_earlier(&mut self, view: &StoredView) -> (Vec<(usize, Distance)>, bool) {
         let model = &mut self.channels[usize::from(view.channel)];
         let mut similar = Vec::new();
@@ -154,21 +154,22 @@ impl ViewMemory {
                 similar.push((number, distance));
             }
         };
-        let stride = match self.stored.len() {
+        let stride = match self.index.count(view.channel) {
             0..=tuning::COMPARED => 1,
             count => count.div_ceil(tuning::DRAWN),
         };
-        let first = view.ordinal as usize % stride;
         let pairs = u32::try_from(stride).unwrap_or(u32::MAX);
-        for number in (first..self.stored.len()).step_by(stride) {
+        let first = view.ordinal as usize % stride;
+        let of_channel = self.index.of_channel(view.channel);
+        let drawn: Vec<usize> = of_channel.skip(first).step_by(stride).collect();
+        for &number in &drawn {
             compare(model, number, pairs);
         }
         if let (2.., Some(cosine)) = (stride, model.similar_cosine()) {
             let alike = self.index.alike(view.channel, &view.vector, cosine, 0);
-            for number in alike {
-                if number % stride != first {
-                    compare(model, number, 0);
-                }
+            let is_left = |number: &usize| drawn.binary_search(number).is_err();
+            for number in alike.into_iter().filter(is_left) {
+                compare(model, number, 0);
             }
             similar.sort_by_key(|(number, _)| *number);
         }
@@ -470,3 +471,6 @@ impl ViewMemory {
 fn is_beyond(motion: &Isometry3<f64>, (length_m, angle_rad): (f64, f64)) -> bool {
     !geometry::is_within(motion, length_m, angle_rad)
 }
+
+#[cfg(test)]
+mod tests;

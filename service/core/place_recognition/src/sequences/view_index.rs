@@ -31,6 +31,8 @@ const ROUNDING: f32 = 1e-4;
 pub(super) struct ViewIndex {
     blocks: PagedVec<Block, 1>,
     len: usize,
+    /// Views of each channel.
+    counts: Vec<usize>,
 }
 
 /// The next views in order.
@@ -105,6 +107,11 @@ impl ViewIndex {
             self.blocks.push(Block::of(view), revision);
         }
         self.len += 1;
+        let channel = usize::from(view.channel);
+        if self.counts.len() <= channel {
+            self.counts.resize(channel + 1, 0);
+        }
+        self.counts[channel] += 1;
         let last = self.blocks.len() - 1;
         if let Some(block) = self.blocks.get_mut(last, revision) {
             block.push(view);
@@ -146,6 +153,18 @@ impl ViewIndex {
             },
         );
         found
+    }
+
+    /// Number of views of a channel.
+    pub(super) fn count(&self, channel: u8) -> usize {
+        self.counts.get(usize::from(channel)).copied().unwrap_or(0)
+    }
+
+    /// The numbers of the views of a channel, in order.
+    pub(super) fn of_channel(&self, channel: u8) -> impl Iterator<Item = usize> {
+        let rows = self.blocks.iter().flat_map(|block| &block.rows);
+        let numbered = rows.enumerate();
+        numbered.filter_map(move |(number, row)| (row.channel == channel).then_some(number))
     }
 
     /// The numbers of the views that may have been stored within the corners of a box, in order.
@@ -194,7 +213,7 @@ impl Block {
     fn of(view: &StoredView) -> Self {
         Self {
             rows: Vec::with_capacity(VIEWS),
-            codes: Vec::with_capacity(VIEWS * view.vector.len()),
+            codes: Vec::new(),
             low: view.in_map,
             high: view.in_map,
             ordinals: [view.ordinal; 2],

@@ -246,6 +246,21 @@ mod tests {
     }
 
     #[test]
+    fn a_pair_that_stands_for_many_counts_as_often() {
+        let (mut many, mut one) = (learned(), learned());
+        let angle_rad = 1.42;
+        for _ in 0..50 {
+            many.learn_unrelated(angle_rad, 7);
+            for _ in 0..7 {
+                one.learn_unrelated(angle_rad, 1);
+            }
+        }
+        assert!((many.unrelated.mean() - one.unrelated.mean()).abs() < 1e-9);
+        assert!((many.unrelated.sd() - one.unrelated.sd()).abs() < 1e-9);
+        assert!((many.unrelated.mean() - 1.5).abs() > 1e-3, "it is learned");
+    }
+
+    #[test]
     fn the_distance_is_the_learned_one() {
         let model = learned();
         for angle_rad in [0.1, 0.33, 0.5, 0.77, 1.0] {

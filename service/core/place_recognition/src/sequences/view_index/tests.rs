@@ -47,8 +47,8 @@ fn no_view_that_is_alike_is_ruled_out_and_most_others_are() {
     let mut draws = Seeded(7);
     let views = views(500, &mut draws);
     let index = ViewIndex::of(views.iter(), 1);
-    let (mut alike, mut found) = (0, 0);
     for (cosine_min, from) in [(0.3, 0), (0.8, 100), (0.95, 321), (-1.0, 64), (1.0, 0)] {
+        let (mut alike, mut found) = (0, 0);
         for query in views.iter().step_by(9) {
             let numbers = index.alike(query.channel, &query.vector, cosine_min, from);
             let is_alike = |number: &usize| {
@@ -61,8 +61,9 @@ fn no_view_that_is_alike_is_ruled_out_and_most_others_are() {
             assert!(numbers.is_sorted());
             (alike, found) = (alike + expected.len(), found + numbers.len());
         }
+        let most = alike + alike / 10 + 56;
+        assert!(found <= most, "{found} of {alike} at {cosine_min}");
     }
-    assert!(found < alike + alike / 10, "{found} of {alike}");
 }
 
 #[test]
