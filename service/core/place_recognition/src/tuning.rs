@@ -438,8 +438,13 @@ pub(crate) mod waking {
     pub(crate) const ALIKE_RATE: f64 = 0.02;
     /// Mean cosine of far views from which a channel shows the same everywhere.
     pub(crate) const ALIKE_MAX: f64 = 0.98;
-    /// Views of a session by which claims are tried.
+    /// Views of an agent in a row by which claims are tried.
     pub(crate) const SHADOW_VIEWS: u32 = 32;
+    /// Most agents by which claims are tried at a time.
+    pub(crate) const SHADOWS_MAX: usize = 8;
+    /// Views of a channel after which an agent shows that anew, and after which one that does not
+    /// go on makes room for another one.
+    pub(crate) const SHADOW_WAITS: u32 = 32;
     /// Rate at which an agent's means of what is alike follow.
     pub(crate) const ALIKE_LATELY: f64 = 0.2;
     /// Views after which an agent is no longer followed.

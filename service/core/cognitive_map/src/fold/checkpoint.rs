@@ -58,8 +58,9 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// veer in the estimate, version 20 no rotation as read beside a motion, version 21 no visits of
 /// places of objects, version 22 no views of maps and nobody tracked among them, version 23 no
 /// compasses, version 24 not what a turn of the body changes in views, version 25 no bias that is
-/// read at a stand and no evidence of places of beacons.
-const VERSION: u16 = 26;
+/// read at a stand and no evidence of places of beacons, version 26 not when claims were tried
+/// last.
+const VERSION: u16 = 27;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

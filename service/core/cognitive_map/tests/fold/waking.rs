@@ -15,6 +15,8 @@ const REACH_M: f64 = 9.0;
 const STEP_M: f64 = 2.5;
 const VIEWS: usize = 24;
 const TAUGHT: usize = 60;
+/// Views after which a robot that explores is told again where it is.
+const TOLD_VIEWS: usize = 6;
 
 /// What is heard.
 #[derive(Clone, Copy, PartialEq)]
@@ -42,7 +44,38 @@ struct Walk {
 }
 
 impl World {
+    /// A hall that robots have explored one after the other.
     fn new(heard: Heard) -> Self {
+        let mut world = Self::unexplored(heard);
+        for _ in 0..TAUGHT {
+            let mut walk = world.wake();
+            world.explore(&mut walk, VIEWS);
+        }
+        world
+    }
+
+    /// A hall that so many robots have explored all at once, told every few steps where they are.
+    fn explored_by(robots: usize) -> Self {
+        let mut world = Self::unexplored(Heard::Hall);
+        let mut walks: Vec<Walk> = (0..robots).map(|_| world.wake()).collect();
+        for _ in 0..TAUGHT * VIEWS / (robots * TOLD_VIEWS) {
+            for walk in &mut walks {
+                world.explore(walk, TOLD_VIEWS);
+            }
+        }
+        world
+    }
+
+    /// A robot is told where it is, and walks about for so many views.
+    fn explore(&mut self, walk: &mut Walk, views: usize) {
+        let start = start_pose([walk.at.x, walk.at.y, 0.0], [0.0, 0.0, walk.yaw_rad]);
+        walk.robot.sample(&mut self.map, start);
+        for _ in 0..views {
+            self.go(walk);
+        }
+    }
+
+    fn unexplored(heard: Heard) -> Self {
         let mut random = Seeded(7);
         let transmitter = |_| {
             let [x, y] = HALL_M.map(|size| size * random.uniform());
@@ -53,21 +86,12 @@ impl World {
             values.keyframe_spacing_m = 5.0;
             values.keyframe_spacing_rad = 3.0;
         }));
-        let mut world = Self {
+        Self {
             heard,
             transmitters,
             random,
             map,
-        };
-        for _ in 0..TAUGHT {
-            let mut walk = world.wake();
-            let start = start_pose([walk.at.x, walk.at.y, 0.0], [0.0, 0.0, walk.yaw_rad]);
-            walk.robot.sample(&mut world.map, start);
-            for _ in 0..VIEWS {
-                world.go(&mut walk);
-            }
         }
-        world
     }
 
     /// A new robot somewhere in the hall, which does not know where.
@@ -186,6 +210,16 @@ fn robots_that_wake_up_in_a_large_hall_are_found() {
         assert_eq!(world.go(&mut walk), twin.go(&mut double));
     }
     assert_eq!(world.map.digest(), twin.map.digest());
+}
+
+/// One robot shows how often a claim is right, and so does a team that goes about at once.
+#[test]
+fn robots_are_found_in_a_hall_that_one_explored_or_a_team_at_once() {
+    for robots in [1, 6] {
+        let errors = World::explored_by(robots).first_claims(10);
+        let wrong = errors.iter().filter(|error| **error > 15.0).count();
+        assert!(errors.len() >= 7 && wrong <= 1, "{robots}: {errors:?}");
+    }
 }
 
 /// What is heard here is heard in the other half as well.

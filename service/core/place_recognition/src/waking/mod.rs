@@ -14,6 +14,7 @@ use state::{
     state_of_struct, write_list,
 };
 
+use crate::keyframes::SampleKey;
 use crate::similarity::logged;
 use crate::tuning::log::NUMBERS_MAX;
 use crate::tuning::waking as tuning;
@@ -152,29 +153,58 @@ impl Waking {
         (channel, alike): (u8, &[Alike]),
         revision: u64,
     ) {
-        let sample = view.sample;
-        let own = { self.filters.iter() }.position(|filter| filter.is_shadow);
-        let number = own.unwrap_or_else(|| {
-            self.filters
-                .push(Filter::new(sample, channel, true), revision);
-            self.filters.len() - 1
-        });
+        let Some(number) = self.shadow_of(view.sample, channel, revision) else {
+            return;
+        };
         let Some(filter) = self.filters.get_mut(number, revision) else {
             return;
         };
-        if (filter.agent, filter.session) != (sample.agent, sample.session) {
-            *filter = Filter::new(sample, channel, true);
-        }
-        if filter.n_views >= tuning::SHADOW_VIEWS || filter.channel != channel {
-            return;
-        }
         let known = &mut self.channels[usize::from(channel)];
+        filter.seen_at = known.n_seen;
         let scores = known.model.scores(alike);
         filter.step(&Moved::of(view, turn), &scores, &self.cells);
         if let Some(mode) = filter.mode(&self.cells) {
             note_alike(filter, &mode, alike, &self.cells);
             known.claims.learn(filter, &mode, &view.pose);
         }
+    }
+
+    /// The number of the shadow of an agent: its own one while that lasts, a while later another
+    /// one, so that an agent that explores alone shows as much as many do. `None` where there are
+    /// none to spare.
+    fn shadow_of(&mut self, sample: SampleKey, channel: u8, revision: u64) -> Option<usize> {
+        let waited = |filter: &Filter| {
+            let known = self.channels.get(usize::from(filter.channel));
+            let since = known.map_or(0, |known| known.n_seen.wrapping_sub(filter.seen_at));
+            since > tuning::SHADOW_WAITS
+        };
+        let is_over = |filter: &Filter| filter.n_views >= tuning::SHADOW_VIEWS;
+        let new = Filter::new(sample, channel, true);
+        let is_own = |filter: &Filter| {
+            (filter.agent, filter.session, filter.channel) == (new.agent, new.session, new.channel)
+        };
+        let shadows = || {
+            let filters = self.filters.iter().enumerate();
+            filters.filter(|(_, filter)| filter.is_shadow)
+        };
+        let own = shadows().find(|(_, filter)| is_own(filter));
+        match own {
+            Some((number, filter)) if !is_over(filter) => return Some(number),
+            Some((_, filter)) if !waited(filter) => return None,
+            _ => (),
+        }
+        let is_free = |filter: &Filter| is_over(filter) || waited(filter);
+        let free = own.or_else(|| shadows().find(|(_, filter)| is_free(filter)));
+        let free = free.map(|(number, _)| number);
+        let count = shadows().count();
+        if let Some(number) = free {
+            *self.filters.get_mut(number, revision)? = new;
+            return Some(number);
+        }
+        (count < tuning::SHADOWS_MAX).then(|| {
+            self.filters.push(new, revision);
+            self.filters.len() - 1
+        })
     }
 
     /// A view of an agent that does not know where it is; answers where, once that is sure.
@@ -241,7 +271,7 @@ impl Waking {
         let own = { self.filters.iter() }
             .position(|filter| !filter.is_shadow && filter.agent == agent && filter.n_views > 0);
         if let Some(filter) = own.and_then(|own| self.filters.get_mut(own, revision)) {
-            let sample = crate::SampleKey {
+            let sample = SampleKey {
                 agent,
                 session: filter.session,
                 seq: 0,

@@ -43,6 +43,8 @@ pub(crate) struct Filter {
     pub(super) channel: u8,
     /// Views so far.
     pub(super) n_views: u32,
+    /// Of a shadow: views of the channel, of all agents, at its latest one.
+    pub(super) seen_at: u32,
     /// Probability that the agent is where nothing is known.
     pub(super) without: f64,
     /// Pose by motion alone at the latest view.
@@ -62,6 +64,7 @@ state_of_struct!(Filter {
     is_shadow,
     channel,
     n_views,
+    seen_at,
     without,
     in_odom,
     alike,
@@ -105,6 +108,7 @@ impl Filter {
             is_shadow,
             channel,
             n_views: 0,
+            seen_at: 0,
             without: tuning::WITHOUT,
             in_odom: Isometry3::identity(),
             alike: [0.0; 2],
