@@ -7,7 +7,10 @@ use crate::recognition::dependence::evidence_share;
 use crate::recognition::episode::Hypotheses;
 use crate::recognition::episode::Recognition;
 use crate::recognition::gaps::told_by_gaps;
-use crate::tuning::{EARNED_MAX, ERROR_REACH, MISS_PER_CONTACT, UNKNOWN_ERROR_REACH};
+use crate::tuning::{
+    EARNED_MAX, ERROR_REACH, MISS_PER_CONTACT, OUTLIER_SHARE, UNKNOWN_ERROR_REACH, UNKNOWN_PRIOR,
+    UNTOLD_ODDS,
+};
 
 impl Recognition {
     /// Probability that the right pose in a learned model is not among the hypotheses. The contacts
@@ -68,6 +71,9 @@ impl Recognition {
         let Hypotheses::Translations(translations) = &self.hypotheses else {
             return unknown;
         };
+        // An object's prior is a part of that of all known ones.
+        let of_each = (1.0 - UNKNOWN_PRIOR) / (UNKNOWN_PRIOR * objects.len().max(1) as f64);
+        let least = (UNTOLD_ODDS * of_each).ln();
         // By contacts that are independent as far as a model's errors reach, in typical links.
         let lead = |&(object, log): &(ObjectId, f64), reach: f64| {
             let lead = unknown - log;
@@ -78,6 +84,24 @@ impl Recognition {
                 let told = told_by_gaps(falls, missed_share);
                 let most = if told > 0.0 { lead.max(0.0) } else { lead };
                 return Some((lead + told).min(most));
+            }
+            if let Some(gaps) = indexed.untold.as_ref().filter(|_| lead > 0.0) {
+                let pose = heaviest()?.pose(&translations.rotations);
+                let outlier = (OUTLIER_SHARE * library.clutter_per_m3()).ln();
+                let said = self
+                    .contacts
+                    .iter()
+                    .rev()
+                    .zip(translations.said.iter().rev());
+                let in_gaps = said.filter(|(contact, _)| {
+                    gaps.hold(&(pose * contact.position_m), contact.variance_m2().sqrt())
+                });
+                let told = in_gaps
+                    .map(|(_, said)| (said - outlier).max(0.0))
+                    .sum::<f64>();
+                // Of contacts that are no longer kept as many are supposed to have been in gaps.
+                let told = told * self.count as f64 / self.contacts.len().max(1) as f64;
+                return Some(lead.min(f64::max(lead - told, least)));
             }
             if indexed.between_sd_m.is_none() {
                 return Some(lead);

@@ -17,8 +17,8 @@ use crate::translations::split::SplitBuffers;
 use crate::translations::touch_update::TouchUpdate;
 use crate::translations::unexplored::Unexplored;
 use crate::tuning::{
-    NEGLIGIBLE_SHARE, PREFILTER_CONTACTS_MAX, PROMOTION_MAX, PROMOTION_MIN, PROMOTION_SEEDS,
-    PRUNE_NATS, TRANSLATIONS_MAX, WAITING_CONTACTS, WAITING_SHARE,
+    CONTACTS_MAX, NEGLIGIBLE_SHARE, PREFILTER_CONTACTS_MAX, PROMOTION_MAX, PROMOTION_MIN,
+    PROMOTION_SEEDS, PRUNE_NATS, TRANSLATIONS_MAX, WAITING_CONTACTS, WAITING_SHARE,
 };
 
 /// All hypotheses.
@@ -33,6 +33,9 @@ pub(crate) struct GaussianSum {
     unexplored: Unexplored,
     /// Log-likelihoods of the contacts under an unknown object, without those that were asked for.
     pub(crate) background: BackgroundModel,
+    /// What the contacts that are kept add to the unknown object's log-likelihood, but for the
+    /// first of all, the latest last.
+    pub(crate) said: Vec<f64>,
     /// Logs of the factors that all masses of each object have for its size.
     sizes: BTreeMap<ObjectId, f64>,
 }
@@ -46,6 +49,7 @@ impl GaussianSum {
             prefilter: Prefilter::default(),
             unexplored: Unexplored::default(),
             background: BackgroundModel::default(),
+            said: Vec::new(),
             sizes: BTreeMap::new(),
         }
     }
@@ -77,6 +81,11 @@ impl GaussianSum {
         };
         self.resize(sizes);
         let unknown = self.unknown(library, before, contact);
+        if self.said.len() >= CONTACTS_MAX {
+            self.said.remove(0);
+        }
+        self.said
+            .push(unknown.as_ref().map_or(0.0, |said| said.log));
         let densities =
             self.unexplored
                 .densities(library, (last, contact), unknown.as_ref(), share);
