@@ -5,7 +5,7 @@ use nalgebra::Point3;
 use crate::index::packed_places::PackedPlaces;
 use crate::indexed_place::IndexedPlace;
 use crate::interpolation::{
-    Fields, LinkGraph, OpenRegion, Spread, UntoldGaps, interpolated, missed_share,
+    Fields, LinkGraph, OpenRegion, Spread, UnpredictedGaps, interpolated, missed_share,
 };
 use crate::level_prior::{LevelPrior, level_prior};
 use crate::model::{LevelMemory, ObjectModel};
@@ -32,7 +32,7 @@ pub(crate) struct IndexedModel {
     /// Where contacts fell on places alone: probability that one is with a place that was missed.
     pub(crate) missed_share: Option<f64>,
     /// The gaps between its places, where neighbours tell nothing of what lies there.
-    pub(crate) untold: Option<UntoldGaps>,
+    pub(crate) unpredicted: Option<UnpredictedGaps>,
     /// Distributions of its levels, by channel.
     pub(crate) own_levels: Vec<LevelPrior>,
     /// Where it goes on beyond what was felt; none of one that was felt all over.
@@ -89,8 +89,8 @@ impl IndexedModel {
         Self {
             packed: PackedPlaces::new(&places, spacing_m, extent_m, model.noise_m2()),
             shares: shares(&positions, extent_m),
-            untold: (fields.is_none() && spread == Spread::Even)
-                .then(|| UntoldGaps::new(&felt, &graph, spacing_m))
+            unpredicted: (fields.is_none() && spread == Spread::Even)
+                .then(|| UnpredictedGaps::new(&felt, &graph, spacing_m))
                 .flatten(),
             open: fields
                 .and_then(|_| OpenRegion::new(&positions, felt.len(), &graph, (spread, spacing_m))),

@@ -177,10 +177,10 @@ pub(crate) const NODES_MAX: usize = 1024;
 pub(crate) const DENSE_LINK: f64 = 1.5;
 /// Deviations of a contact by which it has to lie farther than half a spacing from every place to be
 /// in a gap of which nothing is predicted. Chosen.
-pub(crate) const UNTOLD_DEVIATIONS: f64 = 2.0;
+pub(crate) const UNPREDICTED_DEVIATIONS: f64 = 2.0;
 /// Odds of the unknown object over the best known one down to which such gaps take its lead away:
 /// it comes first, and is not answered. Chosen.
-pub(crate) const UNTOLD_ODDS: f64 = 2.0;
+pub(crate) const UNPREDICTED_ODDS: f64 = 2.0;
 /// Distance of nodes, in spacings. Chosen.
 pub(crate) const NODE_STEP: f64 = 2.0;
 /// Error of what is predicted between the places, per distance of nodes, above which that distance

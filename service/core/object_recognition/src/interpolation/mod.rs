@@ -15,10 +15,10 @@ mod open;
 mod sides;
 mod spread;
 mod taken;
-mod untold;
+mod unpredicted;
 
 pub(crate) use graph::LinkGraph;
 pub(crate) use nodes::{Fields, interpolated};
 pub(crate) use open::{OpenRegion, Part};
 pub(crate) use spread::{Spread, missed_share};
-pub(crate) use untold::UntoldGaps;
+pub(crate) use unpredicted::UnpredictedGaps;

@@ -22,6 +22,8 @@ use crate::tuning::{CONTACTS_MAX, LISTED_SHARE_MIN, REACH_PER_STEP, RIVALS_MAX, 
 #[derive(Clone, Debug)]
 pub struct Recognition {
     pub(super) contacts: Vec<Contact>,
+    /// What each of these adds to the log-likelihood of the unknown object, if that predicts it.
+    pub(super) unknown_logs: Vec<Option<f64>>,
     pub(super) count: usize,
     /// Lengths of the steps between contacts of a walk, in ascending order \[m\].
     pub(super) steps_m: Vec<f64>,
@@ -51,6 +53,7 @@ impl Recognition {
         };
         Self {
             contacts: Vec::new(),
+            unknown_logs: Vec::new(),
             count: 0,
             steps_m: Vec::new(),
             drawn: 0,
@@ -78,26 +81,30 @@ impl Recognition {
         let (steps, reach_m) = (self.steps_m.len(), self.reach_m());
         let spread = (self.count - self.aimed) as f64;
         let sizes = self.translation_sizes(library);
-        match &mut self.hypotheses {
+        let unknown_log = match &mut self.hypotheses {
             Hypotheses::Translations(translations) => {
                 let log = |indexed: &IndexedModel| -walk_log(indexed, 1, reach_m);
                 let logs = library.indexed_models().map(|(_, indexed)| log(indexed));
                 let mean = logs.sum::<f64>() / library.len().max(1) as f64;
                 let share = |object| library.indexed(object).map_or(0.0, |own| log(own) - mean);
-                translations.touch(library, &self.contacts, &contact, sizes, &share);
+                let log = translations.touch(library, &self.contacts, &contact, sizes, &share);
                 translations.settle();
+                log
             }
             Hypotheses::Poses(poses) => {
                 let size_log = |indexed: &IndexedModel, surfel_map: &SurfelMap| {
                     walk_log(indexed, steps, reach_m) - spread * surfel_map.area_m2.ln()
                 };
                 poses.touch(library, &contact, CONTACTS_MAX, &size_log);
+                None
             }
-        }
+        };
         if self.contacts.len() >= CONTACTS_MAX {
             self.contacts.remove(0);
+            self.unknown_logs.remove(0);
         }
         self.contacts.push(contact);
+        self.unknown_logs.push(unknown_log);
     }
 
     /// A contact as exactly as it is known in the frame of a hypothesis, whose rotation is off by

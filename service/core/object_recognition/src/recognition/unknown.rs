@@ -2,6 +2,9 @@
 
 use std::f64::consts::{FRAC_PI_6, PI};
 
+use nalgebra::Isometry3;
+
+use crate::interpolation::UnpredictedGaps;
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::recognition::dependence::evidence_share;
 use crate::recognition::episode::Hypotheses;
@@ -9,7 +12,7 @@ use crate::recognition::episode::Recognition;
 use crate::recognition::gaps::told_by_gaps;
 use crate::tuning::{
     EARNED_MAX, ERROR_REACH, MISS_PER_CONTACT, OUTLIER_SHARE, UNKNOWN_ERROR_REACH, UNKNOWN_PRIOR,
-    UNTOLD_ODDS,
+    UNPREDICTED_ODDS,
 };
 
 impl Recognition {
@@ -62,6 +65,9 @@ impl Recognition {
     /// Of an object whose contacts fell on places alone, what [`told_by_gaps`] adds to a lead takes
     /// an answer away, but calls nothing unknown: at a place that was missed a known object is
     /// named late rather than called unknown.
+    ///
+    /// Where neighbouring places tell nothing of what lies between them, contacts there call nothing
+    /// unknown either: see [`Self::told_in_gaps`]. They leave the unknown object ahead, in doubt.
     pub(super) fn earned(
         &self,
         library: &ObjectLibrary,
@@ -71,9 +77,7 @@ impl Recognition {
         let Hypotheses::Translations(translations) = &self.hypotheses else {
             return unknown;
         };
-        // An object's prior is a part of that of all known ones.
-        let of_each = (1.0 - UNKNOWN_PRIOR) / (UNKNOWN_PRIOR * objects.len().max(1) as f64);
-        let least = (UNTOLD_ODDS * of_each).ln();
+        let doubt = doubt(objects.len());
         // By contacts that are independent as far as a model's errors reach, in typical links.
         let lead = |&(object, log): &(ObjectId, f64), reach: f64| {
             let lead = unknown - log;
@@ -85,23 +89,11 @@ impl Recognition {
                 let most = if told > 0.0 { lead.max(0.0) } else { lead };
                 return Some((lead + told).min(most));
             }
-            if let Some(gaps) = indexed.untold.as_ref().filter(|_| lead > 0.0) {
+            if let Some(gaps) = indexed.unpredicted.as_ref().filter(|_| lead > 0.0) {
                 let pose = heaviest()?.pose(&translations.rotations);
-                let outlier = (OUTLIER_SHARE * library.clutter_per_m3()).ln();
-                let said = self
-                    .contacts
-                    .iter()
-                    .rev()
-                    .zip(translations.said.iter().rev());
-                let in_gaps = said.filter(|(contact, _)| {
-                    gaps.hold(&(pose * contact.position_m), contact.variance_m2().sqrt())
-                });
-                let told = in_gaps
-                    .map(|(_, said)| (said - outlier).max(0.0))
-                    .sum::<f64>();
-                // Of contacts that are no longer kept as many are supposed to have been in gaps.
-                let told = told * self.count as f64 / self.contacts.len().max(1) as f64;
-                return Some(lead.min(f64::max(lead - told, least)));
+                let outlier_log = (OUTLIER_SHARE * library.clutter_per_m3()).ln();
+                let told = self.told_in_gaps(gaps, &pose, outlier_log);
+                return Some(lead.min(f64::max(lead - told, doubt)));
             }
             if indexed.between_sd_m.is_none() {
                 return Some(lead);
@@ -123,4 +115,29 @@ impl Recognition {
             { likeliest.iter().take(EARNED_MAX) }.filter_map(|own| lead(own, UNKNOWN_ERROR_REACH));
         best.1 + leads.fold(over_best, f64::min)
     }
+
+    /// By how much contacts in gaps of which nothing is predicted speak for the unknown object: an
+    /// object that has such gaps takes them for outliers \[nats\].
+    fn told_in_gaps(
+        &self,
+        gaps: &UnpredictedGaps,
+        map_from_episode: &Isometry3<f64>,
+        outlier_log: f64,
+    ) -> f64 {
+        let told = self.contacts.iter().zip(&self.unknown_logs);
+        let told = told.filter_map(|(contact, log)| {
+            let more = (*log)? - outlier_log;
+            let point = map_from_episode * contact.position_m;
+            (more > 0.0 && gaps.hold(&point, contact.variance_m2().sqrt())).then_some(more)
+        });
+        // Of contacts that are no longer kept as many are supposed to have been in gaps.
+        told.sum::<f64>() * self.count as f64 / self.contacts.len().max(1) as f64
+    }
+}
+
+/// By how much the unknown object leads over one of so many known ones at the odds down to which
+/// gaps take its lead away. An object's prior is a part of that of all known ones \[nats\].
+fn doubt(objects: usize) -> f64 {
+    let prior_odds = (1.0 - UNKNOWN_PRIOR) / (UNKNOWN_PRIOR * objects.max(1) as f64);
+    (UNPREDICTED_ODDS * prior_odds).ln()
 }

@@ -1,6 +1,7 @@
 //! What was never learned.
 
 use super::*;
+use crate::numeric::floor_u32;
 
 #[test]
 fn what_was_not_learned_is_unknown() {
@@ -44,16 +45,26 @@ fn sides_m(box_number: u64) -> [f64; 3] {
     [0, 1, 2].map(|axis| 0.05 + 0.06 * uniform(900_000 + 8 * box_number + axis))
 }
 
-/// A point of a box that has waves of level over its faces, with its level.
-fn waved_at(box_number: u64, point: Point3<f64>) -> (Point3<f64>, f64) {
+/// The level at a point of a box.
+type LevelAt = fn(u64, &Point3<f64>) -> f64;
+
+/// Levels in waves over all faces: between contacts they follow from their neighbours.
+const WAVES: LevelAt = |box_number, point| {
     let wave = |axis: u64| 100.0 * (uniform(910_000 + 8 * box_number + axis) - 0.5);
     let phase = wave(0) * point.x + wave(1) * point.y + wave(2) * point.z;
-    (point, (phase + 6.0 * uniform(920_000 + box_number)).sin())
-}
+    (phase + 6.0 * uniform(920_000 + box_number)).sin()
+};
 
-/// What is felt of such a box.
-fn waved(box_number: u64, key: u64) -> (Point3<f64>, f64) {
-    waved_at(box_number, on_box(sides_m(box_number), key).0)
+/// Levels in bands of 15 mm: neighbours tell nothing of what lies between them.
+const BANDS: LevelAt = |box_number, point| {
+    let band = floor_u32((point.x + point.y + 1.0) / 0.015);
+    2.0 * uniform(930_000 + 1_000 * box_number + u64::from(band)) - 1.0
+};
+
+/// A point of such a box with its level.
+fn drawn(level_at: LevelAt, box_number: u64, key: u64) -> (Point3<f64>, f64) {
+    let point = on_box(sides_m(box_number), key).0;
+    (point, level_at(box_number, &point))
 }
 
 /// The same at the points of a raster over all faces, a centimetre apart.
@@ -71,7 +82,7 @@ fn raster(box_number: u64) -> Vec<(Point3<f64>, f64)> {
                 for sign in [-0.5, 0.5] {
                     let mut at = Point3::origin();
                     (at[axis], at[u], at[v]) = (sign * sides_m[axis], at_u, at_v);
-                    points.push(waved_at(box_number, at));
+                    points.push((at, WAVES(box_number, &at)));
                 }
             }
         }
@@ -87,8 +98,10 @@ fn felt((point, level): (Point3<f64>, f64), key: u64) -> Contact {
 }
 
 /// A run of touches over such a box, a centimetre apart or so.
-fn run_over(box_number: u64, count: u64) -> Vec<Contact> {
-    let drawn: Vec<_> = (0..600).map(|key| waved(box_number, 5_000 + key)).collect();
+fn run_over(level_at: LevelAt, box_number: u64, count: u64) -> Vec<Contact> {
+    let drawn: Vec<_> = (0..600)
+        .map(|key| drawn(level_at, box_number, 5_000 + key))
+        .collect();
     let mut at = drawn[0].0;
     let mut ahead = Vector3::x();
     let run = (0..count).map(|number| {
@@ -105,13 +118,13 @@ fn run_over(box_number: u64, count: u64) -> Vec<Contact> {
 }
 
 /// Boxes that were taught by so many contacts each.
-fn taught(boxes: std::ops::Range<u64>, contacts: u64) -> ObjectLibrary {
+fn taught(level_at: LevelAt, boxes: std::ops::Range<u64>, contacts: u64) -> ObjectLibrary {
     let mut library = ObjectLibrary::default();
     for (id, box_number) in (0u32..).zip(boxes) {
         let mut model = ObjectModel::new(ModelSettings::default());
         for key in 0..contacts {
             let key = 1_000_000 + 1_000 * box_number + key;
-            model.learn(&felt(waved(box_number, key), key));
+            model.learn(&felt(drawn(level_at, box_number, key), key));
         }
         library.put(ObjectId(id), model);
     }
@@ -120,10 +133,10 @@ fn taught(boxes: std::ops::Range<u64>, contacts: u64) -> ObjectLibrary {
 
 #[test]
 fn what_was_taught_by_few_contacts_is_never_called_unknown() {
-    let library = taught(0..3, 20);
+    let library = taught(WAVES, 0..3, 20);
     for own in 0..3 {
         let mut recognition = Recognition::new(&Orientation::Known);
-        for (count, contact) in (1..).zip(run_over(own, 200)) {
+        for (count, contact) in (1..).zip(run_over(WAVES, own, 200)) {
             recognition.touch(&library, contact);
             let posterior = recognition.posterior(&library);
             let verdict = posterior.verdict();
@@ -134,7 +147,7 @@ fn what_was_taught_by_few_contacts_is_never_called_unknown() {
     let mut unknown = 0;
     for stranger in 1000..1003 {
         let mut recognition = Recognition::new(&Orientation::Known);
-        for contact in run_over(stranger, 100) {
+        for contact in run_over(WAVES, stranger, 100) {
             recognition.touch(&library, contact);
         }
         let posterior = recognition.posterior(&library);
@@ -146,6 +159,29 @@ fn what_was_taught_by_few_contacts_is_never_called_unknown() {
         unknown += u32::from(posterior.unknown > posterior.objects[0].1);
     }
     assert!(unknown >= 2, "{unknown} of three");
+}
+
+#[test]
+fn gaps_of_which_neighbours_tell_nothing_call_nothing_unknown() {
+    let library = taught(BANDS, 0..5, 20);
+    for own in 0..5 {
+        let mut recognition = Recognition::new(&Orientation::Known);
+        for (count, contact) in (1..).zip(run_over(BANDS, own, 200)) {
+            recognition.touch(&library, contact);
+            let verdict = recognition.posterior(&library).verdict();
+            assert_ne!(verdict, Verdict::Unknown, "{own} after {count} touches");
+        }
+    }
+    // Strangers are rather unknown than any of these.
+    for stranger in 1000..1005 {
+        let mut recognition = Recognition::new(&Orientation::Known);
+        for contact in run_over(BANDS, stranger, 100) {
+            recognition.touch(&library, contact);
+        }
+        let posterior = recognition.posterior(&library);
+        let best = posterior.objects[0].1;
+        assert!(posterior.unknown > best, "{stranger}: {posterior:?}");
+    }
 }
 
 #[test]
@@ -161,7 +197,7 @@ fn what_was_taught_at_the_same_points_again_may_be_felt_between_them() {
     }
     for own in 0..3 {
         let mut recognition = Recognition::new(&Orientation::Known);
-        for (count, contact) in (1..).zip(run_over(own, 100)) {
+        for (count, contact) in (1..).zip(run_over(WAVES, own, 100)) {
             recognition.touch(&library, contact);
             let verdict = recognition.posterior(&library).verdict();
             assert_ne!(verdict, Verdict::Unknown, "{own} after {count} touches");

@@ -17,8 +17,8 @@ use crate::translations::split::SplitBuffers;
 use crate::translations::touch_update::TouchUpdate;
 use crate::translations::unexplored::Unexplored;
 use crate::tuning::{
-    CONTACTS_MAX, NEGLIGIBLE_SHARE, PREFILTER_CONTACTS_MAX, PROMOTION_MAX, PROMOTION_MIN,
-    PROMOTION_SEEDS, PRUNE_NATS, TRANSLATIONS_MAX, WAITING_CONTACTS, WAITING_SHARE,
+    NEGLIGIBLE_SHARE, PREFILTER_CONTACTS_MAX, PROMOTION_MAX, PROMOTION_MIN, PROMOTION_SEEDS,
+    PRUNE_NATS, TRANSLATIONS_MAX, WAITING_CONTACTS, WAITING_SHARE,
 };
 
 /// All hypotheses.
@@ -33,9 +33,6 @@ pub(crate) struct GaussianSum {
     unexplored: Unexplored,
     /// Log-likelihoods of the contacts under an unknown object, without those that were asked for.
     pub(crate) background: BackgroundModel,
-    /// What the contacts that are kept add to the unknown object's log-likelihood, but for the
-    /// first of all, the latest last.
-    pub(crate) said: Vec<f64>,
     /// Logs of the factors that all masses of each object have for its size.
     sizes: BTreeMap<ObjectId, f64>,
 }
@@ -49,7 +46,6 @@ impl GaussianSum {
             prefilter: Prefilter::default(),
             unexplored: Unexplored::default(),
             background: BackgroundModel::default(),
-            said: Vec::new(),
             sizes: BTreeMap::new(),
         }
     }
@@ -59,7 +55,8 @@ impl GaussianSum {
         self.all.is_empty() && self.prefilter.is_empty()
     }
 
-    /// Updates all hypotheses with a contact; `before` are the earlier ones that are kept. `sizes`
+    /// Updates all hypotheses with a contact, and returns what it adds to the log-likelihood of the
+    /// unknown object, if that predicts it; `before` are the earlier ones that are kept. `sizes`
     /// are the logs of the factors that the masses of each object have for its size, after the
     /// contact, and `share` is that of one step of a walk, per that of a typical object.
     ///
@@ -72,20 +69,15 @@ impl GaussianSum {
         contact: &Contact,
         sizes: BTreeMap<ObjectId, f64>,
         share: &impl Fn(ObjectId) -> f64,
-    ) {
+    ) -> Option<f64> {
         let Some(last) = before.last() else {
             self.prefilter = Prefilter::new(library, &self.rotations, contact);
             self.unexplored = Unexplored::new(library);
             self.resize(sizes);
-            return;
+            return None;
         };
         self.resize(sizes);
         let unknown = self.unknown(library, before, contact);
-        if self.said.len() >= CONTACTS_MAX {
-            self.said.remove(0);
-        }
-        self.said
-            .push(unknown.as_ref().map_or(0.0, |said| said.log));
         let densities =
             self.unexplored
                 .densities(library, (last, contact), unknown.as_ref(), share);
@@ -105,6 +97,7 @@ impl GaussianSum {
         self.unexplored.stayed(densities);
         self.all = merged(&parts);
         self.prune();
+        Some(unknown?.log)
     }
 
     /// Changes the factors that the masses of each object have for its size.

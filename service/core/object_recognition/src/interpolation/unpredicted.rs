@@ -4,11 +4,11 @@ use nalgebra::Point3;
 
 use super::graph::LinkGraph;
 use crate::index::nearest_place::NearestPlace;
-use crate::tuning::{EXPLORED_REACH, NODE_STEP, UNTOLD_DEVIATIONS};
+use crate::tuning::{EXPLORED_REACH, NODE_STEP, UNPREDICTED_DEVIATIONS};
 
 /// The gaps between the places of a model that predicts nothing there.
 #[derive(Clone, Debug)]
-pub(crate) struct UntoldGaps {
+pub(crate) struct UnpredictedGaps {
     nearest: NearestPlace,
     /// Distance from a place from which on it tells nothing: half a spacing \[m\].
     field_m: f64,
@@ -16,7 +16,7 @@ pub(crate) struct UntoldGaps {
     reach_m: f64,
 }
 
-impl UntoldGaps {
+impl UnpredictedGaps {
     /// Of places that have these links; none where they are dense.
     pub(crate) fn new(felt: &[Point3<f64>], graph: &LinkGraph, spacing_m: f64) -> Option<Self> {
         if graph.typical_m <= NODE_STEP * spacing_m {
@@ -34,7 +34,7 @@ impl UntoldGaps {
         let Some((square, _)) = self.nearest.find(point) else {
             return false;
         };
-        let from_m = self.field_m + UNTOLD_DEVIATIONS * sd_m;
+        let from_m = self.field_m + UNPREDICTED_DEVIATIONS * sd_m;
         (from_m..self.reach_m.max(from_m)).contains(&square.sqrt())
     }
 }
