@@ -204,6 +204,24 @@ fn a_robot_that_wakes_up_is_found_in_its_room_and_in_no_other() {
 }
 
 #[test]
+fn a_robot_that_comes_from_where_nobody_was_is_found_inside() {
+    let here = room(2);
+    let map = explored(&here);
+    for seed in 1..8 {
+        let mut map = map.clone();
+        let at = [40.0, 1.5 * seed as f64 - 2.0];
+        let mut walker = Walker::untold(&mut map, at, 2.0 * seed as f64, seed);
+        while walker.truth.translation.x > EDGE_M {
+            walker.roam(&mut map, &here, 1);
+            assert!(!walker.is_placed(&map), "{seed}");
+        }
+        walker.roam(&mut map, &here, 50);
+        assert!(walker.is_placed(&map), "{seed}");
+        assert!(walker.off_m(&map) < 0.3, "{seed}: {}", walker.off_m(&map));
+    }
+}
+
+#[test]
 fn nearly_every_robot_that_wakes_up_is_found_within_five_metres() {
     let here = room(9);
     let map = explored(&here);
