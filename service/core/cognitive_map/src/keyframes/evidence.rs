@@ -2,13 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3};
+use nalgebra::{Cholesky, Const, Isometry3, Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 use super::chains::Chains;
 use super::constraint::Constraint;
 use super::problem::Problem;
 use super::tuning;
-use geometry::{planar_part, se3, symmetric};
+use geometry::{planar_part, se3};
 use pose_graph::Marginals;
 
 /// Where a false closure leads: to any earlier place.
@@ -58,17 +58,16 @@ impl Chance {
     pub(super) fn log_gain(&self, closure: &Constraint, is_planar: bool, problem: &Problem) -> f64 {
         let least = tuning::CLOSURE_SD_MIN * tuning::CLOSURE_SD_MIN;
         let own = closure.covariance.matrix() + Matrix6::from_diagonal_element(least);
-        if is_planar {
-            let volume = (TAU.powi(3) * planar_part(&own).determinant()).sqrt();
-            return -volume.ln() - self.log_density;
-        }
-        let to =
-            { problem.pose(closure.to) }.map_or_else(UnitQuaternion::identity, |to| to.rotation);
-        let by_chance = self.log_density_in_space(&own, &to);
+        let gain = if is_planar {
+            root(&planar_part(&own)).map(|root| peak_log(&root) - self.log_density)
+        } else {
+            let to = problem.pose(closure.to);
+            let to = to.map_or_else(UnitQuaternion::identity, |to| to.rotation);
+            let by_chance = self.log_density_in_space(&own, &to);
+            by_chance.and_then(|by_chance| Some(peak_log(&root(&own)?) - by_chance))
+        };
         // Of no covariance nothing is gained.
-        by_chance.map_or(0.0, |by_chance| {
-            -0.5 * (own * TAU).determinant().ln() - by_chance
-        })
+        gain.unwrap_or_default()
     }
 
     /// The log-density in space where a closure leads, where it is known but for a covariance about
@@ -89,14 +88,23 @@ impl Chance {
         }
         let order = [2, 3, 4, 0, 1];
         let known = SMatrix::<f64, 5, 5>::from_fn(|row, column| known[(order[row], order[column])]);
-        let root = ((known + known.transpose()) * 0.5).cholesky()?;
-        let log_volume = 2.5 * TAU.ln() + root.l_dirty().diagonal().map(f64::ln).sum();
-        Some(-log_volume - TAU.ln())
+        Some(peak_log(&root(&known)?) - TAU.ln())
     }
 }
 
+/// The Cholesky root of a covariance; `None` if it is none.
+fn root<const N: usize>(covariance: &SMatrix<f64, N, N>) -> Option<Cholesky<f64, Const<N>>> {
+    ((covariance + covariance.transpose()) * 0.5).cholesky()
+}
+
+/// Log of a normal distribution's density at its mean. A determinant may be rounded to a negative
+/// one where a covariance is wide along some axes and narrow along others.
+fn peak_log<const N: usize>(root: &Cholesky<f64, Const<N>>) -> f64 {
+    -0.5 * N as f64 * TAU.ln() - root.l_dirty().diagonal().map(f64::ln).sum()
+}
+
 /// Log of the ratio between the probability density of a closure by the map and that by chance; and
-/// `None` if the map does not know one of its ends.
+/// `None` if the map does not know one of its ends, or what is known is no covariance.
 ///
 /// ```text
 /// ln N(d; 0, S + R) − ln p₀        d = log(T_expected⁻¹ T_stated)
@@ -119,19 +127,16 @@ pub(super) fn log_evidence(
     let least = tuning::CLOSURE_SD_MIN * tuning::CLOSURE_SD_MIN;
     let whole: Matrix6<f64> =
         spread.matrix() + constraint.covariance.matrix() + Matrix6::from_diagonal_element(least);
-    if !is_planar {
-        let root = symmetric(&whole).cholesky()?;
+    if is_planar {
+        let root = root(&planar_part(&whole))?;
+        let off = Vector3::new(off[0], off[1], off[5]);
         let squared = off.dot(&root.solve(&off));
-        let diagonal = root.l_dirty().diagonal();
-        let log_volume = 3.0 * TAU.ln() + diagonal.map(f64::ln).sum();
-        let by_chance = chance.log_density_in_space(&whole, &problem.map.pose(to).rotation)?;
-        return Some(-0.5 * squared - log_volume - by_chance);
+        return Some(peak_log(&root) - 0.5 * squared - chance.log_density);
     }
-    let planar = planar_part(&whole);
-    let off = Vector3::new(off[0], off[1], off[5]);
-    let squared = off.dot(&(planar.try_inverse()? * off));
-    let volume = (TAU.powi(3) * planar.determinant()).sqrt();
-    Some(-0.5 * squared - volume.ln() - chance.log_density)
+    let root = root(&whole)?;
+    let squared = off.dot(&root.solve(&off));
+    let by_chance = chance.log_density_in_space(&whole, &problem.map.pose(to).rotation)?;
+    Some(peak_log(&root) - 0.5 * squared - by_chance)
 }
 
 #[cfg(test)]
@@ -193,6 +198,22 @@ mod tests {
         for extent_m in [1e3, 1e5, 1e7] {
             let less = density(extent_m) - density(10.0 * extent_m);
             assert!((less - 100.0_f64.ln()).abs() < 1e-6, "{less}");
+        }
+    }
+
+    #[test]
+    fn a_density_is_as_high_as_its_covariance_is_narrow() {
+        // Up to ten kilometres along a line that is askew, and a millimetre in all other directions.
+        let along = nalgebra::Vector6::from_fn(|axis, _| (1.3 * axis as f64 + 0.4).sin());
+        let mut before = f64::INFINITY;
+        for wide_m2 in [1e-6, 1.0, 1e4, 1e6, 1e8] {
+            let own = along * along.transpose() * wide_m2 + Matrix6::from_diagonal_element(1e-6);
+            let found = peak_log(&root(&own).expect("it is a covariance"));
+            let eigenvalues = 5.0 * 1e-6_f64.ln() + (along.norm_squared() * wide_m2 + 1e-6).ln();
+            let expected = -3.0 * TAU.ln() - 0.5 * eigenvalues;
+            assert!((found - expected).abs() < 0.1, "{found} {expected}");
+            assert!(found < before, "{found}");
+            before = found;
         }
     }
 
