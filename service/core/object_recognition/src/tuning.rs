@@ -175,8 +175,8 @@ pub(crate) const NODES_MAX: usize = 1024;
 /// Typical link of a surface, in spacings, up to which it needs no nodes: places that are kept
 /// apart by a spacing lie so far from one another, across the diagonals of a square too. Chosen.
 pub(crate) const DENSE_LINK: f64 = 1.5;
-/// Deviations of a contact by which it has to lie farther than half a spacing from every place to be
-/// in a gap of which nothing is predicted. Chosen.
+/// Deviations of a contact by which it lies farther than half a spacing from every place that is in
+/// a gap of which nothing is predicted. Chosen.
 pub(crate) const UNPREDICTED_DEVIATIONS: f64 = 2.0;
 /// Odds of the unknown object over the best known one down to which such gaps take its lead away:
 /// it comes first, and is not answered. Chosen.

@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn a_density_is_as_high_as_its_covariance_is_narrow() {
-        // Up to ten kilometres along a line that is askew, and a millimetre in all other directions.
+        // Up to ten kilometres along a line that is askew, and a millimetre in all directions.
         let along = nalgebra::Vector6::from_fn(|axis, _| (1.3 * axis as f64 + 0.4).sin());
         let mut before = f64::INFINITY;
         for wide_m2 in [1e-6, 1.0, 1e4, 1e6, 1e8] {

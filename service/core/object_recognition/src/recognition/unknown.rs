@@ -66,7 +66,7 @@ impl Recognition {
     /// an answer away, but calls nothing unknown: at a place that was missed a known object is
     /// named late rather than called unknown.
     ///
-    /// Where neighbouring places tell nothing of what lies between them, contacts there call nothing
+    /// Where neighbouring places tell nothing of what lies between, contacts there call nothing
     /// unknown either: see [`Self::told_in_gaps`]. They leave the unknown object ahead, in doubt.
     pub(super) fn earned(
         &self,
