@@ -31,8 +31,8 @@ pub(crate) struct IndexedModel {
     pub(crate) between_sd_m: Option<f64>,
     /// Where contacts fell on places alone: probability that one is with a place that was missed.
     pub(crate) missed_share: Option<f64>,
-    /// The gaps between its places, where neighbours tell nothing of what lies there.
-    pub(crate) unpredicted: Option<UnpredictedGaps>,
+    /// The gaps between its places, if nothing is predicted there.
+    pub(crate) gaps: Option<UnpredictedGaps>,
     /// Distributions of its levels, by channel.
     pub(crate) own_levels: Vec<LevelPrior>,
     /// Where it goes on beyond what was felt; none of one that was felt all over.
@@ -89,7 +89,7 @@ impl IndexedModel {
         Self {
             packed: PackedPlaces::new(&places, spacing_m, extent_m, model.noise_m2()),
             shares: shares(&positions, extent_m),
-            unpredicted: (fields.is_none() && spread == Spread::Even)
+            gaps: (fields.is_none() && spread == Spread::Even)
                 .then(|| UnpredictedGaps::new(&felt, &graph, spacing_m))
                 .flatten(),
             open: fields

@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::graph::LinkGraph;
 use crate::index::nearest_place::NearestPlace;
-use crate::tuning::{EXPLORED_REACH, NODE_STEP, UNPREDICTED_DEVIATIONS};
+use crate::tuning::{BETWEEN_MIN, EXPLORED_REACH, NODE_STEP, UNPREDICTED_DEVIATIONS};
 
 /// The gaps between the places of a model that predicts nothing there.
 #[derive(Clone, Debug)]
@@ -17,9 +17,10 @@ pub(crate) struct UnpredictedGaps {
 }
 
 impl UnpredictedGaps {
-    /// Of places that have these links; none where they are dense.
+    /// Of places that have these links; none where they are dense, or so few that a gap between
+    /// two of them would be all there is.
     pub(crate) fn new(felt: &[Point3<f64>], graph: &LinkGraph, spacing_m: f64) -> Option<Self> {
-        if graph.typical_m <= NODE_STEP * spacing_m {
+        if felt.len() < BETWEEN_MIN || graph.typical_m <= NODE_STEP * spacing_m {
             return None;
         }
         Some(Self {

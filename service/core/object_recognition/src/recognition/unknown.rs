@@ -4,12 +4,14 @@ use std::f64::consts::{FRAC_PI_6, PI};
 
 use nalgebra::Isometry3;
 
+use crate::indexed_model::IndexedModel;
 use crate::interpolation::UnpredictedGaps;
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::recognition::dependence::evidence_share;
 use crate::recognition::episode::Hypotheses;
 use crate::recognition::episode::Recognition;
 use crate::recognition::gaps::told_by_gaps;
+use crate::recognition::likelihoods::walk_log;
 use crate::tuning::{
     EARNED_MAX, ERROR_REACH, MISS_PER_CONTACT, OUTLIER_SHARE, UNKNOWN_ERROR_REACH, UNKNOWN_PRIOR,
     UNPREDICTED_ODDS,
@@ -67,7 +69,7 @@ impl Recognition {
     /// named late rather than called unknown.
     ///
     /// Where neighbouring places tell nothing of what lies between, contacts there call nothing
-    /// unknown either: see [`Self::told_in_gaps`]. They leave the unknown object ahead, in doubt.
+    /// unknown either: see [`Self::told_by_outliers`]. They leave the unknown object ahead, in doubt.
     pub(super) fn earned(
         &self,
         library: &ObjectLibrary,
@@ -78,6 +80,11 @@ impl Recognition {
             return unknown;
         };
         let doubt = doubt(objects.len());
+        // What one step of a walk adds for its length.
+        let reach_m = self.reach_m();
+        let step_log = |indexed: &IndexedModel| walk_log(indexed, 1, reach_m);
+        let step_logs = library.indexed_models().map(|(_, own)| step_log(own));
+        let mean_step_log = step_logs.sum::<f64>() / library.len().max(1) as f64;
         // By contacts that are independent as far as a model's errors reach, in typical links.
         let lead = |&(object, log): &(ObjectId, f64), reach: f64| {
             let lead = unknown - log;
@@ -89,10 +96,11 @@ impl Recognition {
                 let most = if told > 0.0 { lead.max(0.0) } else { lead };
                 return Some((lead + told).min(most));
             }
-            if let Some(gaps) = indexed.unpredicted.as_ref().filter(|_| lead > 0.0) {
+            if let Some(gaps) = indexed.gaps.as_ref().filter(|_| lead > doubt) {
                 let pose = heaviest()?.pose(&translations.rotations);
-                let outlier_log = (OUTLIER_SHARE * library.clutter_per_m3()).ln();
-                let told = self.told_in_gaps(gaps, &pose, outlier_log);
+                let share_log = step_log(indexed) - mean_step_log;
+                let outlier_log = (OUTLIER_SHARE * library.clutter_per_m3()).ln() + share_log;
+                let told = self.told_by_outliers(gaps, &pose, outlier_log);
                 return Some(lead.min(f64::max(lead - told, doubt)));
             }
             if indexed.between_sd_m.is_none() {
@@ -116,9 +124,9 @@ impl Recognition {
         best.1 + leads.fold(over_best, f64::min)
     }
 
-    /// By how much contacts in gaps of which nothing is predicted speak for the unknown object: an
-    /// object that has such gaps takes them for outliers \[nats\].
-    fn told_in_gaps(
+    /// By how much contacts in gaps of which nothing is predicted speak for the unknown object, if
+    /// the object that has these gaps takes them for outliers \[nats\].
+    fn told_by_outliers(
         &self,
         gaps: &UnpredictedGaps,
         map_from_episode: &Isometry3<f64>,

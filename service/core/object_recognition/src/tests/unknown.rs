@@ -185,6 +185,29 @@ fn gaps_of_which_neighbours_tell_nothing_call_nothing_unknown() {
 }
 
 #[test]
+fn one_object_of_few_contacts_among_others_of_many_is_not_called_unknown() {
+    let mut library = taught(BANDS, 1..5, 600);
+    let sparse = taught(BANDS, 0..1, 20);
+    library.put(
+        ObjectId(9),
+        sparse.get(ObjectId(0)).expect("one was put").clone(),
+    );
+    let mut recognition = Recognition::new(&Orientation::Known);
+    for (count, contact) in (1..).zip(run_over(BANDS, 0, 200)) {
+        recognition.touch(&library, contact);
+        let verdict = recognition.posterior(&library).verdict();
+        assert_ne!(verdict, Verdict::Unknown, "after {count} touches");
+    }
+    // Another one is not taken for it.
+    let mut recognition = Recognition::new(&Orientation::Known);
+    for contact in run_over(BANDS, 1000, 100) {
+        recognition.touch(&library, contact);
+    }
+    let posterior = recognition.posterior(&library);
+    assert!(posterior.unknown > posterior.objects[0].1, "{posterior:?}");
+}
+
+#[test]
 fn what_was_taught_at_the_same_points_again_may_be_felt_between_them() {
     let mut library = ObjectLibrary::default();
     for (id, box_number) in (0u32..).zip(0..3) {
