@@ -69,7 +69,8 @@ impl Recognition {
     /// named late rather than called unknown.
     ///
     /// Where neighbouring places tell nothing of what lies between, contacts there call nothing
-    /// unknown either: see [`Self::told_by_outliers`]. They leave the unknown object ahead, in doubt.
+    /// unknown either: see [`Self::told_by_outliers`]. They leave the unknown object ahead, in
+    /// doubt.
     pub(super) fn earned(
         &self,
         library: &ObjectLibrary,
