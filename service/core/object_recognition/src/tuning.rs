@@ -175,11 +175,11 @@ pub(crate) const NODES_MAX: usize = 1024;
 /// Typical link of a surface, in spacings, up to which it needs no nodes: places that are kept
 /// apart by a spacing lie so far from one another, across the diagonals of a square too. Chosen.
 pub(crate) const DENSE_LINK: f64 = 1.5;
-/// Deviations of a contact by which it lies farther than half a spacing from every place that is in
-/// a gap of which nothing is predicted. Chosen.
+/// A contact is in a gap of which nothing is predicted if it is farther from every place than half
+/// a spacing and so many of its deviations. Chosen.
 pub(crate) const UNPREDICTED_DEVIATIONS: f64 = 2.0;
-/// Odds of the unknown object over the best known one down to which such gaps take its lead away:
-/// it comes first, and is not answered. Chosen.
+/// Odds of the unknown object over one that has such gaps, below which these do not take its lead:
+/// it comes first still, but a space that asks for more is not answered. Chosen.
 pub(crate) const UNPREDICTED_ODDS: f64 = 2.0;
 /// Distance of nodes, in spacings. Chosen.
 pub(crate) const NODE_STEP: f64 = 2.0;

@@ -8,7 +8,7 @@ use super::chains::Chains;
 use super::constraint::Constraint;
 use super::problem::Problem;
 use super::tuning;
-use geometry::{planar_part, se3};
+use geometry::{planar_part, se3, symmetric};
 use pose_graph::Marginals;
 
 /// Where a false closure leads: to any earlier place.
@@ -94,7 +94,7 @@ impl Chance {
 
 /// The Cholesky root of a covariance; `None` if it is none.
 fn root<const N: usize>(covariance: &SMatrix<f64, N, N>) -> Option<Cholesky<f64, Const<N>>> {
-    ((covariance + covariance.transpose()) * 0.5).cholesky()
+    symmetric(covariance).cholesky()
 }
 
 /// Log of a normal distribution's density at its mean. A determinant may be rounded to a negative

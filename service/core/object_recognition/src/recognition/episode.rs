@@ -10,7 +10,7 @@ use crate::numeric::log_sum;
 use crate::orientation::Orientation;
 use crate::poses::PoseHypotheses;
 use crate::posterior::{Posterior, entropy_nats};
-use crate::recognition::likelihoods::{unknown_fit_log, walk_log};
+use crate::recognition::likelihoods::{step_share_logs, unknown_fit_log, walk_log};
 use crate::surfels::map::SurfelMap;
 use crate::translations::GaussianSum;
 use crate::tuning::{CONTACTS_MAX, LISTED_SHARE_MIN, REACH_PER_STEP, RIVALS_MAX, UNKNOWN_PRIOR};
@@ -83,10 +83,8 @@ impl Recognition {
         let sizes = self.translation_sizes(library);
         let unknown_log = match &mut self.hypotheses {
             Hypotheses::Translations(translations) => {
-                let log = |indexed: &IndexedModel| -walk_log(indexed, 1, reach_m);
-                let logs = library.indexed_models().map(|(_, indexed)| log(indexed));
-                let mean = logs.sum::<f64>() / library.len().max(1) as f64;
-                let share = |object| library.indexed(object).map_or(0.0, |own| log(own) - mean);
+                let share_log = step_share_logs(library, reach_m);
+                let share = |object| library.indexed(object).map_or(0.0, &share_log);
                 let log = translations.touch(library, &self.contacts, &contact, sizes, &share);
                 translations.settle();
                 log

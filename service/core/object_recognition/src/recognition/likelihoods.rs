@@ -3,6 +3,7 @@
 use std::f64::consts::{FRAC_1_PI, TAU};
 
 use crate::indexed_model::IndexedModel;
+use crate::library::ObjectLibrary;
 use crate::tuning::UNKNOWN_MISFIT_SD;
 
 /// Log density of a walk's contacts, per that of contacts drawn from the whole model: each lies on
@@ -10,6 +11,18 @@ use crate::tuning::UNKNOWN_MISFIT_SD;
 pub(super) fn walk_log(indexed: &IndexedModel, steps: usize, reach_m: Option<f64>) -> f64 {
     let share = reach_m.map_or(0.0, |reach_m| indexed.share(reach_m).max(1e-9).ln());
     -(steps as f64) * share
+}
+
+/// Log of the share of a model that lies within reach of a walk's step, less its mean over all
+/// models.
+pub(super) fn step_share_logs(
+    library: &ObjectLibrary,
+    reach_m: Option<f64>,
+) -> impl Fn(&IndexedModel) -> f64 {
+    let log = move |indexed: &IndexedModel| -walk_log(indexed, 1, reach_m);
+    let logs = library.indexed_models().map(|(_, indexed)| log(indexed));
+    let mean = logs.sum::<f64>() / library.len().max(1) as f64;
+    move |indexed| log(indexed) - mean
 }
 
 /// Log likelihood ratio of a goodness of fit: an unknown object against a learned one.

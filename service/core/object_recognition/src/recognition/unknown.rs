@@ -4,14 +4,13 @@ use std::f64::consts::{FRAC_PI_6, PI};
 
 use nalgebra::Isometry3;
 
-use crate::indexed_model::IndexedModel;
 use crate::interpolation::UnpredictedGaps;
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::recognition::dependence::evidence_share;
 use crate::recognition::episode::Hypotheses;
 use crate::recognition::episode::Recognition;
 use crate::recognition::gaps::told_by_gaps;
-use crate::recognition::likelihoods::walk_log;
+use crate::recognition::likelihoods::step_share_logs;
 use crate::tuning::{
     EARNED_MAX, ERROR_REACH, MISS_PER_CONTACT, OUTLIER_SHARE, UNKNOWN_ERROR_REACH, UNKNOWN_PRIOR,
     UNPREDICTED_ODDS,
@@ -81,11 +80,7 @@ impl Recognition {
             return unknown;
         };
         let doubt = doubt(objects.len());
-        // What one step of a walk adds for its length.
-        let reach_m = self.reach_m();
-        let step_log = |indexed: &IndexedModel| walk_log(indexed, 1, reach_m);
-        let step_logs = library.indexed_models().map(|(_, own)| step_log(own));
-        let mean_step_log = step_logs.sum::<f64>() / library.len().max(1) as f64;
+        let share_log = step_share_logs(library, self.reach_m());
         // By contacts that are independent as far as a model's errors reach, in typical links.
         let lead = |&(object, log): &(ObjectId, f64), reach: f64| {
             let lead = unknown - log;
@@ -99,8 +94,9 @@ impl Recognition {
             }
             if let Some(gaps) = indexed.gaps.as_ref().filter(|_| lead > doubt) {
                 let pose = heaviest()?.pose(&translations.rotations);
-                let share_log = step_log(indexed) - mean_step_log;
-                let outlier_log = (OUTLIER_SHARE * library.clutter_per_m3()).ln() + share_log;
+                // A step is the less likely the more of a model lies within its reach.
+                let outlier_log =
+                    (OUTLIER_SHARE * library.clutter_per_m3()).ln() - share_log(indexed);
                 let told = self.told_by_outliers(gaps, &pose, outlier_log);
                 return Some(lead.min(f64::max(lead - told, doubt)));
             }

@@ -188,10 +188,8 @@ fn gaps_of_which_neighbours_tell_nothing_call_nothing_unknown() {
 fn one_object_of_few_contacts_among_others_of_many_is_not_called_unknown() {
     let mut library = taught(BANDS, 1..5, 600);
     let sparse = taught(BANDS, 0..1, 20);
-    library.put(
-        ObjectId(9),
-        sparse.get(ObjectId(0)).expect("one was put").clone(),
-    );
+    let sparse = sparse.get(ObjectId(0)).expect("one was taught");
+    library.put(ObjectId(9), sparse.clone());
     let mut recognition = Recognition::new(&Orientation::Known);
     for (count, contact) in (1..).zip(run_over(BANDS, 0, 200)) {
         recognition.touch(&library, contact);
