@@ -44,6 +44,12 @@ impl IndexedPlace {
                     .ln();
             }
         }
+        sum + self.descriptor_log(contact)
+    }
+
+    /// The same of its descriptors alone.
+    pub(crate) fn descriptor_log(&self, contact: &Contact) -> f64 {
+        let mut sum = 0.0;
         for reading in &contact.descriptors {
             let own = self
                 .descriptors

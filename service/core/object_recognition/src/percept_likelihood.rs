@@ -7,6 +7,7 @@ use crate::contact::{Contact, LevelReading};
 use crate::index::packed_places::{PackedPlace, PackedPlaces};
 use crate::indexed_model::IndexedModel;
 use crate::level_prior::LevelPrior;
+use crate::model::LevelMemory;
 use crate::numeric::{exp, to_f32};
 use crate::tuning::{
     LEVEL_VARIANCE_FLOOR, NORMAL_VARIANCE, SPARSE_RATIOS, WRONG_NORMAL_SHARE, WRONG_PERCEPT_SHARE,
@@ -19,7 +20,6 @@ pub(crate) const LANES: usize = 8;
 #[derive(Clone, Debug)]
 pub(crate) struct ContactPercepts<'a> {
     pub(crate) contact: &'a Contact,
-    level_prior: &'a [LevelPrior],
     levels: Vec<Level>,
 }
 
@@ -62,8 +62,19 @@ struct NormalPercept {
 
 impl<'a> ContactPercepts<'a> {
     /// Of a contact, with the distribution of levels over the library.
-    pub(crate) fn new(contact: &'a Contact, level_prior: &'a [LevelPrior]) -> Self {
+    pub(crate) fn new(contact: &'a Contact, level_prior: &[LevelPrior]) -> Self {
+        Self::in_measure_of(contact, contact, level_prior)
+    }
+
+    /// The same, against how likely the levels of another contact are anywhere.
+    pub(crate) fn in_measure_of(
+        contact: &'a Contact,
+        other: &Contact,
+        level_prior: &[LevelPrior],
+    ) -> Self {
         let level = |reading: &LevelReading| {
+            let of_channel = |own: &&LevelReading| own.channel == reading.channel;
+            let anywhere = other.levels.iter().find(of_channel)?;
             let level_prior = level_prior
                 .iter()
                 .find(|level_prior| level_prior.channel == reading.channel)?;
@@ -71,12 +82,11 @@ impl<'a> ContactPercepts<'a> {
                 channel: reading.channel,
                 value: reading.value,
                 noise: reading.sd * reading.sd + level_prior.variance * LEVEL_VARIANCE_FLOOR,
-                scale: (1.0 - WRONG_PERCEPT_SHARE) / level_prior.density(reading),
+                scale: (1.0 - WRONG_PERCEPT_SHARE) / level_prior.density(anywhere),
             })
         };
         Self {
             contact,
-            level_prior,
             levels: contact.levels.iter().filter_map(level).collect(),
         }
     }
@@ -87,9 +97,7 @@ impl<'a> ContactPercepts<'a> {
         indexed: &'a IndexedModel,
         rotation: &UnitQuaternion<f64>,
     ) -> PerceptLikelihood<'a> {
-        let Self {
-            contact, levels, ..
-        } = self;
+        let Self { contact, levels } = self;
         let kind = match indexed.packed.levels() {
             _ if levels.is_empty() && contact.descriptors.is_empty() => PerceptForm::Nothing,
             None => PerceptForm::Several,
@@ -116,7 +124,9 @@ impl<'a> ContactPercepts<'a> {
 }
 
 impl PerceptLikelihood<'_> {
-    /// Likelihood ratio of the percepts: at a place, against anywhere. It is the exponential of
+    /// Likelihood ratio of the percepts: at a place, against anywhere.
+    ///
+    /// In the measure of the contact itself it is the exponential of
     /// [`percept_log`](crate::indexed_place::IndexedPlace::percept_log), times that of the normal.
     pub(crate) fn likelihood(&self, number: usize, packed_place: &PackedPlace) -> f32 {
         let likelihood = match &self.kind {
@@ -244,11 +254,15 @@ impl PerceptLikelihood<'_> {
 
     fn place_likelihood(&self, number: usize) -> f32 {
         let place = &self.indexed.places[self.indexed.packed.place(number)];
-        to_f32(
-            place
-                .percept_log(self.percepts.contact, self.percepts.level_prior)
-                .exp(),
-        )
+        let ratios = self.percepts.levels.iter().filter_map(|level| {
+            let of_channel = |own: &&LevelMemory| own.channel == level.channel;
+            let own = place.levels.iter().find(of_channel)?;
+            let (apart, variance) = (level.value - own.mean, own.variance() + level.noise);
+            let here = (-0.5 * apart * apart / variance).exp() / variance.sqrt();
+            Some(level.scale * here + WRONG_PERCEPT_SHARE)
+        });
+        let descriptors = place.descriptor_log(self.percepts.contact).exp();
+        to_f32(ratios.product::<f64>() * descriptors)
     }
 }
 
@@ -284,7 +298,7 @@ mod tests {
 
     use super::*;
     use crate::level_prior::level_prior;
-    use crate::model::{LevelMemory, ModelPlace};
+    use crate::model::ModelPlace;
     use crate::{ModelSettings, ObjectModel};
 
     #[test]
@@ -359,6 +373,57 @@ mod tests {
                     assert!((packed - full).abs() < 1e-3, "{packed} {full} {contact:?}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn the_measure_of_another_contact_scales_what_a_right_level_tells() {
+        let level = |channel, mean| LevelMemory {
+            channel,
+            count: 3.0,
+            mean,
+            squares: 0.2,
+            noise: 0.03,
+        };
+        // One level alone is compared at once, and lists one by one.
+        for channels in [1, 2] {
+            let place = ModelPlace {
+                position_m: Point3::origin(),
+                normals: Vector3::zeros(),
+                count: 3.0,
+                visits: 1.0,
+                variance_m2: 1e-6,
+                normal_variance: 0.0,
+                levels: (0..channels).map(|channel| level(channel, 2.0)).collect(),
+                descriptors: Vec::new(),
+            };
+            let model = ObjectModel::with_places(ModelSettings::default(), 0.004, vec![place]);
+            let indexed = IndexedModel::new(&model);
+            let level_prior = [LevelPrior {
+                channel: 0,
+                mean: 1.0,
+                variance: 4.0,
+            }];
+            let contact = |value| Contact::at(Point3::origin(), 0.001).with_level(0, value, 0.1);
+            let (own, other) = (contact(2.1), contact(4.0));
+            let right = |percepts: &ContactPercepts<'_>| {
+                let local = percepts.at(&indexed, &UnitQuaternion::identity());
+                f64::from(local.likelihood(0, &indexed.packed.all[0])) - WRONG_PERCEPT_SHARE
+            };
+            let same = right(&ContactPercepts::new(&own, &level_prior));
+            let scaled = ContactPercepts::in_measure_of(&own, &other, &level_prior);
+            let density = |contact: &Contact| level_prior[0].density(&contact.levels[0]);
+            let expected = same * density(&own) / density(&other);
+            let scaled = right(&scaled);
+            assert!(expected > 1.2 * same, "{expected} {same}");
+            assert!(
+                (scaled / expected - 1.0).abs() < 1e-4,
+                "{scaled} {expected}"
+            );
+            // Without a level on that channel there is nothing to compare with.
+            let bare = ContactPercepts::in_measure_of(&own, &own.bare(), &level_prior);
+            let bare = right(&bare) + WRONG_PERCEPT_SHARE;
+            assert!((bare - 1.0).abs() < 1e-6, "{bare}");
         }
     }
 }

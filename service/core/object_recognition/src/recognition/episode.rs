@@ -149,14 +149,16 @@ impl Recognition {
                 .iter()
                 .map(|object| object.1)
                 .fold(f64::NEG_INFINITY, f64::max);
-            none += self.earned(
-                library,
-                &objects,
-                evidence_share * self.unknown_log(library),
-            );
-            if matches!(self.hypotheses, Hypotheses::Poses(_)) {
-                let strange = unknown_fit_log(fit, self.contacts.len());
-                none = log_sum([none, UNKNOWN_PRIOR.ln() + most + prior + strange].into_iter());
+            match &self.hypotheses {
+                Hypotheses::Translations(translations) => {
+                    none += self.earned(library, &objects, translations);
+                }
+                Hypotheses::Poses(_) => {
+                    let any = none + evidence_share * self.unknown_pose_log(library);
+                    let strange = unknown_fit_log(fit, self.contacts.len());
+                    let misfit = none + most + prior + strange;
+                    none = log_sum([any, misfit].into_iter());
+                }
             }
             let miss_probability = self.miss_probability();
             let missed_log = none - UNKNOWN_PRIOR.ln() + miss_probability.ln();

@@ -11,6 +11,7 @@ use crate::recognition::episode::Hypotheses;
 use crate::recognition::episode::Recognition;
 use crate::recognition::gaps::told_by_gaps;
 use crate::recognition::likelihoods::step_share_logs;
+use crate::translations::{GaussianSum, UnknownLogs};
 use crate::tuning::{
     EARNED_MAX, ERROR_REACH, MISS_PER_CONTACT, OUTLIER_SHARE, UNKNOWN_ERROR_REACH, UNKNOWN_PRIOR,
     UNPREDICTED_ODDS,
@@ -29,39 +30,78 @@ impl Recognition {
         }
     }
 
-    /// Log-likelihood of the contacts under an unknown object, in the measure of the hypotheses.
-    pub(super) fn unknown_log(&self, library: &ObjectLibrary) -> f64 {
-        let extent_m = library.extent_m().max(1e-6);
-        let aimed = -(self.aimed as f64) * extent_m.ln();
+    /// Log-likelihood of the contacts under an unknown object, in the measure of translations.
+    pub(super) fn background_logs(
+        &self,
+        library: &ObjectLibrary,
+        translations: &GaussianSum,
+    ) -> UnknownLogs {
         let steps = self.steps_m.len() as f64;
-        match &self.hypotheses {
-            Hypotheses::Translations(translations) => {
-                let shares = self.reach_m().map_or(0.0, |reach_m| {
-                    let logs = library
-                        .indexed_models()
-                        .map(|(_, s)| s.share(reach_m).max(1e-9).ln());
-                    logs.sum::<f64>() / library.len().max(1) as f64
-                });
-                translations.background.log - steps * shares + aimed
-            }
-            // Only its size is known: a contact lies anywhere within a step, with any normal.
-            Hypotheses::Poses(_) => {
-                let ball = |radius_m: f64| (8.0 * FRAC_PI_6 * radius_m.powi(3)).ln();
-                let found = self.reach_m().map_or(0.0, |reach_m| {
-                    steps * ball(reach_m.min(0.5 * extent_m).max(1e-6))
-                });
-                let drawn = self.drawn as f64 * ball(0.5 * extent_m);
-                -found - drawn - self.count as f64 * (4.0 * PI).ln() + aimed
-            }
-        }
+        let shares = self.reach_m().map_or(0.0, |reach_m| {
+            let logs = library
+                .indexed_models()
+                .map(|(_, s)| s.share(reach_m).max(1e-9).ln());
+            logs.sum::<f64>() / library.len().max(1) as f64
+        });
+        let size = self.aimed_log(library) - steps * shares;
+        translations.background.logs.plus(size)
     }
 
-    /// Log-likelihood of an unknown object by independent contacts; `unknown` is that by all.
+    /// The same in the measure of poses. Only its size is known: a contact lies anywhere within a
+    /// step, with any normal.
+    pub(super) fn unknown_pose_log(&self, library: &ObjectLibrary) -> f64 {
+        let extent_m = library.extent_m().max(1e-6);
+        let steps = self.steps_m.len() as f64;
+        let ball = |radius_m: f64| (8.0 * FRAC_PI_6 * radius_m.powi(3)).ln();
+        let found = self.reach_m().map_or(0.0, |reach_m| {
+            steps * ball(reach_m.min(0.5 * extent_m).max(1e-6))
+        });
+        let drawn = self.drawn as f64 * ball(0.5 * extent_m);
+        self.aimed_log(library) - found - drawn - self.count as f64 * (4.0 * PI).ln()
+    }
+
+    /// The part of contacts that were asked for: anywhere within the size of the largest object.
+    fn aimed_log(&self, library: &ObjectLibrary) -> f64 {
+        -(self.aimed as f64) * library.extent_m().max(1e-6).ln()
+    }
+
+    /// Log-likelihood of an unknown object, as it counts, in the measure of translations.
     ///
-    /// Contacts in one gap of a model share its errors. So the lead of an unknown object over a
-    /// known one, or of the best known one over it, counts as that of fewer contacts. Over the best
-    /// one an unknown object leads by the least of its leads over the likeliest. The odds between
-    /// known objects stay as they are.
+    /// Over the best one an unknown object leads by the least of its leads over the likeliest. The
+    /// odds between known objects stay as they are.
+    pub(super) fn earned(
+        &self,
+        library: &ObjectLibrary,
+        objects: &[(ObjectId, f64)],
+        translations: &GaussianSum,
+    ) -> f64 {
+        let unknown = self.background_logs(library, translations);
+        let mut likeliest: Vec<_> = objects.iter().filter(|own| own.1.is_finite()).collect();
+        likeliest.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let Some(&best) = likeliest.first() else {
+            return unknown.log();
+        };
+        let doubt = doubt(objects.len());
+        let lead = |&(object, log): &(ObjectId, f64)| {
+            self.earned_lead(library, translations, object, unknown.plus(-log), doubt)
+        };
+        let over_best = unknown.log() - best.1;
+        let earned = lead(best).unwrap_or(over_best);
+        if earned <= 0.0 {
+            return best.1 + earned;
+        }
+        let others = likeliest.into_iter().take(EARNED_MAX).skip(1);
+        let leads = others.filter_map(lead);
+        best.1 + leads.fold(over_best.min(earned), f64::min)
+    }
+
+    /// The lead of an unknown object over a known one, as it counts; none where that has no
+    /// hypothesis left. `leads` are those by all contacts.
+    ///
+    /// Contacts in one gap of a model share its errors. So the lead of an unknown object, or of the
+    /// known one over what the library predicts, counts as that of fewer contacts. The lead of the
+    /// known one over levels that are predicted from the contacts before counts in full: of an
+    /// error that contacts share, those before told.
     ///
     /// Of an object whose contacts fell on places alone, what [`told_by_gaps`] adds to a lead takes
     /// an answer away, but calls nothing unknown: at a place that was missed a known object is
@@ -70,55 +110,41 @@ impl Recognition {
     /// Where neighbouring places tell nothing of what lies between, contacts there call nothing
     /// unknown either: see [`Self::told_by_outliers`]. They leave the unknown object ahead, in
     /// doubt.
-    pub(super) fn earned(
+    fn earned_lead(
         &self,
         library: &ObjectLibrary,
-        objects: &[(ObjectId, f64)],
-        unknown: f64,
-    ) -> f64 {
-        let Hypotheses::Translations(translations) = &self.hypotheses else {
-            return unknown;
-        };
-        let doubt = doubt(objects.len());
-        let share_log = step_share_logs(library, self.reach_m());
-        // By contacts that are independent as far as a model's errors reach, in typical links.
-        let lead = |&(object, log): &(ObjectId, f64), reach: f64| {
-            let lead = unknown - log;
-            let indexed = library.indexed(object)?;
-            let heaviest = || translations.heaviest(object, 1).first().copied();
-            if let Some(missed_share) = indexed.missed_share {
-                let falls = heaviest().map(|own| own.falls).unwrap_or_default();
-                let told = told_by_gaps(falls, missed_share);
-                let most = if told > 0.0 { lead.max(0.0) } else { lead };
-                return Some((lead + told).min(most));
-            }
-            if let Some(gaps) = indexed.gaps.as_ref().filter(|_| lead > doubt) {
-                let pose = heaviest()?.pose(&translations.rotations);
-                // A step is the less likely the more of a model lies within its reach.
-                let outlier_log =
-                    (OUTLIER_SHARE * library.clutter_per_m3()).ln() - share_log(indexed);
-                let told = self.told_by_outliers(gaps, &pose, outlier_log);
-                return Some(lead.min(f64::max(lead - told, doubt)));
-            }
-            if indexed.between_sd_m.is_none() {
-                return Some(lead);
-            }
-            let pose = heaviest()?.pose(&translations.rotations);
-            Some(lead * evidence_share(indexed, &pose, &self.contacts, reach))
-        };
-        let mut likeliest: Vec<_> = objects.iter().filter(|own| own.1.is_finite()).collect();
-        likeliest.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let Some(best) = likeliest.first() else {
-            return unknown;
-        };
-        let over_best = unknown - best.1;
-        let earned = lead(best, ERROR_REACH).unwrap_or(over_best);
-        if earned <= 0.0 {
-            return best.1 + earned;
+        translations: &GaussianSum,
+        object: ObjectId,
+        leads: UnknownLogs,
+        doubt: f64,
+    ) -> Option<f64> {
+        let indexed = library.indexed(object)?;
+        let lead = leads.log();
+        let heaviest = || translations.heaviest(object, 1).first().copied();
+        if let Some(missed_share) = indexed.missed_share {
+            let falls = heaviest().map(|own| own.falls).unwrap_or_default();
+            let told = told_by_gaps(falls, missed_share);
+            let most = if told > 0.0 { lead.max(0.0) } else { lead };
+            return Some((lead + told).min(most));
         }
-        let leads =
-            { likeliest.iter().take(EARNED_MAX) }.filter_map(|own| lead(own, UNKNOWN_ERROR_REACH));
-        best.1 + leads.fold(over_best, f64::min)
+        let pose = || Some(heaviest()?.pose(&translations.rotations));
+        if let Some(gaps) = indexed.gaps.as_ref().filter(|_| lead > doubt) {
+            // A step is the less likely the more of a model lies within its reach.
+            let share_log = step_share_logs(library, self.reach_m());
+            let outlier_log = (OUTLIER_SHARE * library.clutter_per_m3()).ln() - share_log(indexed);
+            let told = self.told_by_outliers(gaps, &pose()?, outlier_log);
+            return Some(lead.min(f64::max(lead - told, doubt)));
+        }
+        if indexed.between_sd_m.is_none() {
+            return Some(lead);
+        }
+        let pose = pose()?;
+        let share = |reach| evidence_share(indexed, &pose, &self.contacts, reach);
+        if lead > 0.0 {
+            return Some(lead * share(UNKNOWN_ERROR_REACH));
+        }
+        let library = leads.library * share(ERROR_REACH);
+        Some(UnknownLogs { library, ..leads }.log().min(0.0))
     }
 
     /// By how much contacts in gaps of which nothing is predicted speak for the unknown object, if

@@ -228,3 +228,33 @@ fn what_was_taught_at_the_same_points_again_may_be_felt_between_them() {
         assert_eq!(verdict, Verdict::Object(id));
     }
 }
+
+/// Waves in a range of levels that every fourth box has alone.
+const WAVES_APART: LevelAt =
+    |box_number, point| 3.0 * (box_number % 4) as f64 + 0.5 * WAVES(box_number, point);
+
+#[test]
+fn another_thing_with_levels_like_those_of_one_object_alone_is_not_taken_for_it() {
+    let library = taught(WAVES_APART, 0..4, 600);
+    let touched = |box_number, contacts: &[u64]| {
+        let mut recognition = Recognition::new(&Orientation::Known);
+        let run = run_over(WAVES_APART, box_number, 100);
+        let verdicts = (1..).zip(run).filter_map(|(count, contact)| {
+            recognition.touch(&library, contact);
+            { contacts.contains(&count) }.then(|| recognition.posterior(&library).verdict())
+        });
+        verdicts.collect::<Vec<_>>()
+    };
+    let mut unknown = 0;
+    for own in 0..4 {
+        let id = ObjectId(u32::try_from(own).expect("there are four"));
+        assert_eq!(touched(own, &[60]), [Verdict::Object(id)]);
+        for stranger in [40, 80, 120, 160].map(|more| own + more) {
+            let verdicts = touched(stranger, &[60, 80, 100]);
+            let named = |verdict: &Verdict| matches!(verdict, Verdict::Object(_));
+            assert!(!verdicts.iter().any(named), "{stranger}: {verdicts:?}");
+            unknown += u32::from(verdicts[2] == Verdict::Unknown);
+        }
+    }
+    assert!(unknown >= 12, "{unknown} of 16");
+}

@@ -1,45 +1,69 @@
 //! Background model: contacts with an unknown object, predicted from the surfaces of the library.
 
 use std::collections::BTreeMap;
-use std::f64::consts::{LN_2, TAU};
+use std::f64::consts::LN_2;
 
 use nalgebra::UnitQuaternion;
 
 use crate::contact::Contact;
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::numeric::log_sum;
-use crate::percept_likelihood::ContactPercepts;
-use crate::translations::candidates::CandidateSearch;
-use crate::tuning::{BACKGROUND_WEIGHT_MIN, OUTLIER_SHARE};
+use crate::translations::unknown_contact::{PerceptLogs, unknown_contact};
 
-/// Log-likelihood of the contacts under an unknown object.
+/// Log-likelihoods of the contacts under an unknown object.
 ///
-/// Its percepts are either like those of the library or carry no information, each with probability
-/// ½. It depends on the object for which the unknown one would be taken: that one's places do not
-/// count. When another object comes to be the best, its log-likelihood would rise by all that the
-/// best one had earned so far. So it rises by one contact after the other only, each by the object
-/// that was the best before; it falls at once.
+/// They depend on the object for which the unknown one would be taken: that one's places do not
+/// count. When another object comes to be the best, they would rise by all that the best one had
+/// earned so far. So they rise by one contact after the other only, each by the object that was the
+/// best before; they fall at once.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BackgroundModel {
     /// Sums over all contacts so far, by the object for which it would be taken.
-    sums: BTreeMap<ObjectId, [f64; 2]>,
+    sums: BTreeMap<ObjectId, PerceptLogs>,
     /// The object for which it would be taken after the contacts so far.
     best: Option<ObjectId>,
     /// Of all contacts so far.
-    pub(crate) log: f64,
+    pub(crate) logs: UnknownLogs,
+}
+
+/// Log-likelihoods of contacts under an unknown object, by what it is predicted from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct UnknownLogs {
+    /// From the library alone: its percepts are either like those there or carry no information,
+    /// each with probability ½.
+    pub(crate) library: f64,
+    /// From the nearest contact before: its levels change over the surface like those of the
+    /// library, from whatever they are. None before levels could be compared.
+    pub(crate) nearest: Option<f64>,
+}
+
+impl UnknownLogs {
+    /// By all of them, each with the same probability.
+    pub(crate) fn log(self) -> f64 {
+        let both = |nearest| log_sum([self.library, nearest].into_iter()) - LN_2;
+        self.nearest.map_or(self.library, both)
+    }
+
+    /// All with so much more.
+    pub(crate) fn plus(self, log: f64) -> Self {
+        Self {
+            library: self.library + log,
+            nearest: self.nearest.map(|nearest| nearest + log),
+        }
+    }
 }
 
 /// Log densities of a contact with an unknown object.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct UnknownContact {
-    /// By the object for which it would be taken, with percepts and without.
-    pub(crate) of_objects: BTreeMap<ObjectId, [f64; 2]>,
+    /// By the object for which it would be taken.
+    pub(crate) of_objects: BTreeMap<ObjectId, PerceptLogs>,
     /// After the contacts before: what the contact adds to the unknown object's log-likelihood.
     pub(crate) log: f64,
 }
 
 impl BackgroundModel {
-    /// Adds a contact: see [`background_logs`].
+    /// Adds a contact: see [`unknown_contact`].
     pub(crate) fn touch(
         &mut self,
         library: &ObjectLibrary,
@@ -47,130 +71,41 @@ impl BackgroundModel {
         pair: (&Contact, &Contact),
         drift_m2: f64,
     ) -> UnknownContact {
-        let of_objects = background_logs(library, rotations, pair, drift_m2);
-        let before = self.log_of_best();
+        let of_objects = unknown_contact(library, rotations, pair, drift_m2);
+        let (own, before) = (self.logs, self.logs_of_best());
         for (object, logs) in &of_objects {
-            for (sum, log) in self.sums.entry(*object).or_default().iter_mut().zip(logs) {
-                *sum += log;
-            }
+            self.sums.entry(*object).or_default().add(logs);
         }
-        let log = { self.log_of_best().zip(before) }.map_or(0.0, |(now, before)| now - before);
-        self.log += log;
+        if let Some((now, before)) = self.logs_of_best().zip(before) {
+            self.logs.library += now.library - before.library;
+        }
+        if let Some(said) = self.best.and_then(|best| of_objects.get(&best)) {
+            let compared = own.nearest.is_some() || said.changing.is_some();
+            let nearest = own.nearest.unwrap_or(own.library) + said.changing();
+            self.logs.nearest = compared.then_some(nearest);
+        }
+        let log = self.logs.log() - own.log();
         UnknownContact { of_objects, log }
     }
 
     /// After a contact: the object for which the unknown one would be taken now.
     pub(crate) fn settle(&mut self, best: Option<ObjectId>) {
         self.best = best;
-        if let Some(log) = self.log_of_best() {
-            self.log = self.log.min(log);
+        if let Some(logs) = self.logs_of_best() {
+            self.logs.library = self.logs.library.min(logs.library);
+            let least = |own: f64| own.min(logs.nearest.unwrap_or(own));
+            self.logs.nearest = self.logs.nearest.map(least);
         }
     }
 
     /// Of all contacts so far, taken for the best object.
-    fn log_of_best(&self) -> Option<f64> {
+    fn logs_of_best(&self) -> Option<UnknownLogs> {
         let best = self.best?;
-        let logs = self.sums.get(&best).copied().unwrap_or_default();
-        Some(log_sum(logs.iter().copied()) - LN_2)
-    }
-}
-
-/// Log density of a contact with an unknown object, by the object for which it would be taken.
-///
-/// It is the mean over places of the library, each taken for the one touched by `other` and
-/// weighted by the likelihood of the percepts there. Places of the object for which it would be
-/// taken do not count: percepts that occur nowhere else would otherwise be as likely of an unknown
-/// object. `drift_m2` is the variance of the drift of path integration since the contact before.
-///
-/// Evidence for a model thus begins where it explains more than a typical surface does. A uniform
-/// density would be no rival: a step along any surface ends on most others, and neighbouring places
-/// are similar on most.
-///
-/// The second number is the same without percepts.
-fn background_logs(
-    library: &ObjectLibrary,
-    rotations: &[UnitQuaternion<f64>],
-    (other, contact): (&Contact, &Contact),
-    drift_m2: f64,
-) -> BTreeMap<ObjectId, [f64; 2]> {
-    let bare = [other, contact].map(Contact::bare);
-    let step = contact.position_m - other.position_m;
-    let noise = contact.position_sd_m * contact.position_sd_m + drift_m2;
-    let before =
-        [other, &bare[0]].map(|contact| ContactPercepts::new(contact, library.level_prior()));
-    let now =
-        [contact, &bare[1]].map(|contact| ContactPercepts::new(contact, library.level_prior()));
-    // An object without a sample is one of which no place is to be left out.
-    let objects = library.indexed_models().map(|(object, _)| object);
-    let mut sums: BTreeMap<ObjectId, [Sums; 2]> =
-        objects.map(|object| (object, Default::default())).collect();
-    let mut nearby = CandidateSearch::default();
-    let mut turns = rotations.iter().cycle();
-    for sample in library.samples() {
-        let (Some(indexed), Some(rotation)) = (library.indexed(sample.object), turns.next()) else {
-            continue;
-        };
-        let number = sample.packed_place as usize;
-        let packed_place = &indexed.packed.all[number];
-        let weights = before.each_ref().map(|percepts| {
-            let likelihood = percepts
-                .at(indexed, rotation)
-                .likelihood(number, packed_place);
-            f64::from(likelihood)
-        });
-        let [whole, bare] = now
-            .each_ref()
-            .map(|percepts| percepts.at(indexed, rotation));
-        let point = sample.position + rotation * step;
-        let densities = nearby.densities(&indexed.packed, &point, noise, [&whole, &bare]);
-        let sums = sums.entry(sample.object).or_default();
-        for ((sums, weight), density) in sums.iter_mut().zip(weights).zip(densities) {
-            let density = density / TAU.powf(1.5);
-            let density = density / indexed.places.len() as f64;
-            sums.add([weight * density, weight, density, 1.0]);
-        }
-    }
-    let mut all = [Sums::default(); 2];
-    for own in sums.values() {
-        for (all, own) in all.iter_mut().zip(own) {
-            all.add(own.0);
-        }
-    }
-    let clutter_per_m3 = OUTLIER_SHARE * library.clutter_per_m3();
-    { sums.into_iter() }
-        .map(|(object, own)| {
-            let logs = std::array::from_fn(|k| {
-                let density =
-                    (1.0 - OUTLIER_SHARE) * all[k].typical_without(&own[k]) + clutter_per_m3;
-                density.ln()
-            });
-            (object, logs)
+        let sums = self.sums.get(&best).copied().unwrap_or_default();
+        Some(UnknownLogs {
+            library: log_sum([sums.alike, sums.bare].into_iter()) - LN_2,
+            nearest: sums.changing,
         })
-        .collect()
-}
-
-/// Sums over places: weighted densities, weights, densities, and their number.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums([f64; 4]);
-
-impl Sums {
-    fn add(&mut self, other: [f64; 4]) {
-        for (sum, own) in self.0.iter_mut().zip(other) {
-            *sum += own;
-        }
-    }
-
-    /// Mean density over the others than these.
-    fn typical_without(&self, own: &Self) -> f64 {
-        let [sum, weights, plain, count] = self.0;
-        let (others, weight) = (sum - own.0[0], weights - own.0[1]);
-        // Without places of another object only the geometry counts.
-        let typical = if weight > BACKGROUND_WEIGHT_MIN * weights {
-            others / weight
-        } else {
-            plain / count
-        };
-        typical.max(0.0)
     }
 }
 
@@ -220,15 +155,16 @@ mod tests {
             background.settle(Some(ObjectId(u32::from(k % 4))));
             let levels = [k, k + 1].map(|k| f64::from(k * 5 % 13));
             let [before, now] = [contact(k, levels[0]), contact(k + 1, levels[1])];
-            let log = background.log;
+            let log = background.logs.log();
             let said = background.touch(&library, &none, (&before, &now), 0.0);
-            let most = said.of_objects.values().flatten().copied();
+            let most = said.of_objects.values();
+            let most = most.flat_map(|logs| [logs.alike, logs.bare, logs.changing()]);
             let most = most.fold(f64::NEG_INFINITY, f64::max);
-            assert!(background.log - log <= most + 1e-9, "{k}: {said:?}");
-            let log = background.log;
+            assert!(background.logs.log() - log <= most + 1e-9, "{k}: {said:?}");
+            let log = background.logs.log();
             background.settle(Some(ObjectId(u32::from((k + 1) % 4))));
-            assert!(background.log <= log, "{k}");
-            falls += u32::from(background.log < log);
+            assert!(background.logs.log() <= log, "{k}");
+            falls += u32::from(background.logs.log() < log);
         }
         assert!(falls > 0, "no other object explains it better");
     }

@@ -89,7 +89,7 @@ impl GaussianSum {
         if !self.prefilter.is_empty() {
             self.promote(library, before, &touch, &mut buffers, &mut parts);
         }
-        let bare = |object| Some(unknown.as_ref()?.of_objects.get(&object)?[1] + share(object));
+        let bare = |object| Some(unknown.as_ref()?.of_objects.get(&object)?.bare + share(object));
         let best = parts.iter().map(|part| part.evidence);
         let best = best.fold(self.prefilter.best_log(), f64::max);
         let (rotations, least) = (&self.rotations, best - PRUNE_NATS);

@@ -11,6 +11,8 @@ mod prefilter_group;
 mod split;
 mod touch_update;
 mod unexplored;
+mod unknown_contact;
 
+pub(crate) use background::UnknownLogs;
 pub(crate) use gaussian_sum::GaussianSum;
 pub(crate) use hypothesis::{Falls, TranslationHypothesis};

@@ -15,10 +15,10 @@ use crate::tuning::{ENTER_MIN, PREFILTER_CONTACTS_MAX};
 
 /// Where an episode may have been that knows no place of an object: on what was not explored of it.
 ///
-/// There a contact is as likely as with an unknown object whose percepts are like those of the
-/// library, so that it says nothing against the object but that so much of it should be missing:
-/// each further contact stays there with a probability that falls with the step. Otherwise it is
-/// the first one on what was explored, at its edge.
+/// There a contact is as likely as with an unknown object, so that it says nothing against the
+/// object but that so much of it should be missing: each further contact stays there with a
+/// probability that falls with the step. Otherwise it is the first one on what was explored, at its
+/// edge.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Unexplored {
     /// Log of the mass of the episodes that were nowhere else so far.
@@ -55,8 +55,10 @@ impl Unexplored {
         let Some(unknown) = unknown else {
             return BTreeMap::new();
         };
-        // Without the object that explains it best: else its places would speak for all others.
-        let least = unknown.of_objects.values().map(|logs| logs[0]);
+        // In the way that makes it likeliest, as the unknown object may be of any; and without the
+        // object that explains it best: else its places would speak for all others.
+        let logs = unknown.of_objects.values();
+        let least = logs.map(|logs| logs.alike.max(logs.bare).max(logs.changing()));
         let least = least.fold(f64::INFINITY, f64::min);
         let densities = self.logs.keys().filter_map(|object| {
             let indexed = library.indexed(*object)?;
