@@ -301,15 +301,18 @@ mod tests {
     use crate::model::ModelPlace;
     use crate::{ModelSettings, ObjectModel};
 
-    #[test]
-    fn a_packed_place_has_the_likelihood_of_the_place_itself() {
-        let level = |channel, mean| LevelMemory {
+    fn level(channel: u16, mean: f64) -> LevelMemory {
+        LevelMemory {
             channel,
             count: 3.0,
             mean,
             squares: 0.2,
             noise: 0.03,
-        };
+        }
+    }
+
+    #[test]
+    fn a_packed_place_has_the_likelihood_of_the_place_itself() {
         // Where the level is far from nothing, what is left of its digits has to do.
         let lists = [
             vec![vec![], vec![]],
@@ -378,13 +381,6 @@ mod tests {
 
     #[test]
     fn the_measure_of_another_contact_scales_what_a_right_level_tells() {
-        let level = |channel, mean| LevelMemory {
-            channel,
-            count: 3.0,
-            mean,
-            squares: 0.2,
-            noise: 0.03,
-        };
         // One level alone is compared at once, and lists one by one.
         for channels in [1, 2] {
             let place = ModelPlace {

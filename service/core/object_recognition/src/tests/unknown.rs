@@ -258,3 +258,22 @@ fn another_thing_with_levels_like_those_of_one_object_alone_is_not_taken_for_it(
     }
     assert!(unknown >= 12, "{unknown} of 16");
 }
+
+#[test]
+fn levels_at_the_ends_of_what_a_number_holds_leave_a_posterior() {
+    let library = taught(WAVES_APART, 0..3, 60);
+    for value in [0.0, 1e30, -1e200, f64::MAX] {
+        for sd in [0.0, 0.03, 1e30, 1e200, f64::MAX] {
+            let mut recognition = Recognition::new(&Orientation::Known);
+            for (number, contact) in (0..).zip(run_over(WAVES_APART, 0, 12)) {
+                let value = if number % 2 == 0 { value } else { -value };
+                let bare = Contact::at(contact.position_m, NOISE_M);
+                recognition.touch(&library, bare.with_level(0, value, sd));
+                let posterior = recognition.posterior(&library);
+                let sum =
+                    posterior.unknown + posterior.objects.iter().map(|own| own.1).sum::<f64>();
+                assert!((sum - 1.0).abs() < 1e-6, "{value} {sd}: {posterior:?}");
+            }
+        }
+    }
+}
