@@ -36,6 +36,10 @@ impl RawPublisher {
     }
 
     /// Puts bytes under a key, once somebody listens to it: what is put before that is gone.
+    ///
+    /// The key goes along whole. A publisher would declare it and send its number, which may
+    /// overtake the declaration and is then dropped (eclipse-zenoh/zenoh#980); robots send again
+    /// what is not acknowledged.
     pub fn put(&mut self, key: &str, encoding: &str, bytes: Vec<u8>) {
         if !self.publishers.contains_key(key) {
             let publisher = self
@@ -55,11 +59,7 @@ impl RawPublisher {
             }
             self.publishers.insert(key.to_owned(), publisher);
         }
-        self.publishers[key]
-            .put(bytes)
-            .encoding(Encoding::from(encoding))
-            .wait()
-            .expect("the session is open");
+        self.put_unmatched(key, encoding, bytes);
     }
 
     /// Puts bytes under a key at once. Somebody must be known to listen, which they are once

@@ -7,8 +7,8 @@ use crate::indexed_place::IndexedPlace;
 use crate::interpolation::{
     Fields, LinkGraph, OpenRegion, Spread, UnpredictedGaps, interpolated, missed_share,
 };
-use crate::level_prior::{LevelPrior, level_prior};
-use crate::model::{LevelMemory, ObjectModel};
+use crate::level_prior::{LevelPrior, object_levels, without_unusual_levels};
+use crate::model::ObjectModel;
 use crate::numeric::{centroid, floor_u32};
 use crate::surfels::map::SurfelMap;
 
@@ -50,7 +50,8 @@ impl IndexedModel {
             .map(|place| place.position_m)
             .collect();
         let graph = LinkGraph::new(&felt);
-        let fields = Fields::learned(model.places(), &graph);
+        let usual = without_unusual_levels(model.places());
+        let fields = Fields::learned(&usual, &graph);
         let spread = Spread::learned(model.places(), &graph, spacing_m);
         let between = fields.as_ref().filter(|_| spread == Spread::Even);
         // On a surface contacts fall up to half a link beside a place, or half the step of nodes.
@@ -76,7 +77,7 @@ impl IndexedModel {
             })
             .collect();
         if let Some(fields) = between {
-            let nodes = interpolated(model.places(), &graph, fields, spacing_m);
+            let nodes = interpolated(&usual, &graph, fields, spacing_m);
             places.extend(nodes);
         }
         let positions: Vec<_> = places.iter().map(|place| place.position).collect();
@@ -100,14 +101,9 @@ impl IndexedModel {
             gap_m: graph.typical_m,
             between_sd_m: between_sd_m(&places),
             missed_share: (spread == Spread::OnPlaces).then(|| missed_share(model.places())),
-            own_levels: level_prior(places.iter().flat_map(|place| &place.levels)),
+            own_levels: object_levels(places.iter().flat_map(|place| &place.levels)),
             places,
         }
-    }
-
-    /// The levels of all places, one of each channel for each place.
-    pub(crate) fn levels(&self) -> impl Iterator<Item = &LevelMemory> {
-        self.places.iter().flat_map(|place| &place.levels)
     }
 
     /// Mean share of the model within `reach_m` of one of its places.

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Unit, Vector3};
 use crate::contact::{Contact, DescriptorReading};
 use crate::level_prior::LevelPrior;
 use crate::model::LevelMemory;
-use crate::tuning::{DESCRIPTOR_SCALE, LEVEL_VARIANCE_FLOOR, WRONG_PERCEPT_SHARE};
+use crate::tuning::{DESCRIPTOR_SCALE, WRONG_PERCEPT_SHARE};
 
 /// One place of a model.
 #[derive(Clone, Debug)]
@@ -34,9 +34,7 @@ impl IndexedPlace {
                 .iter()
                 .find(|level_prior| level_prior.channel == reading.channel);
             if let (Some(own), Some(level_prior)) = (own, level_prior) {
-                let variance = own.variance()
-                    + reading.sd * reading.sd
-                    + level_prior.variance * LEVEL_VARIANCE_FLOOR;
+                let variance = own.variance() + level_prior.noise(reading);
                 let apart = reading.value - own.mean;
                 let here = (-0.5 * apart * apart / variance).exp() / variance.sqrt();
                 sum += ((1.0 - WRONG_PERCEPT_SHARE) * here / level_prior.density(reading)

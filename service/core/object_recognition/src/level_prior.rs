@@ -1,24 +1,170 @@
-//! Distribution of the levels of a channel over all places of a library.
+//! Distribution of the levels of a channel over places.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use crate::contact::{Contact, LevelReading};
-use crate::model::LevelMemory;
-use crate::tuning::{LEVEL_DENSITY_FLOOR, WRONG_PERCEPT_SHARE};
+use crate::model::{LevelMemory, ModelPlace};
+use crate::numeric::floor_u32;
+use crate::tuning::{
+    LEVEL_DENSITY_FLOOR, LEVEL_REACH, LEVEL_ROUNDING, LEVEL_VARIANCE_FLOOR, WRONG_PERCEPT_SHARE,
+};
 
-/// Normal distribution of the levels of a channel over all places.
-#[derive(Clone, Copy, Debug)]
+/// Distribution of the levels of a channel over the places of an object or of a library: a mixture
+/// of normal distributions.
+///
+/// Levels far from most others of their object, and those of objects at another order of
+/// magnitude, have a normal distribution of their own. Thus one that stands for "nothing felt", or
+/// is in another unit, changes little of what the others tell.
+#[derive(Clone, Debug)]
 pub(crate) struct LevelPrior {
     pub(crate) channel: u16,
-    pub(crate) mean: f64,
-    pub(crate) variance: f64,
+    components: Vec<Component>,
+}
+
+/// Normal distribution of some levels.
+#[derive(Clone, Copy, Debug)]
+struct Component {
+    /// Part of the whole.
+    share: f64,
+    /// Number of places.
+    count: f64,
+    mean: f64,
+    /// Sum of squared differences from the mean.
+    squares: f64,
+}
+
+/// What levels of an object belong together: those in reach of their median.
+#[derive(Clone, Copy, Debug)]
+struct UsualLevels {
+    median: f64,
+    reach: f64,
+}
+
+impl UsualLevels {
+    fn new(levels: &[f64]) -> Self {
+        let median = |mut levels: Vec<f64>| {
+            levels.sort_unstable_by(f64::total_cmp);
+            levels.get(levels.len() / 2).copied().unwrap_or_default()
+        };
+        let middle = median(levels.to_vec());
+        let apart = median(levels.iter().map(|level| (level - middle).abs()).collect());
+        let rounding = LEVEL_ROUNDING.sqrt() * (1.0 + middle.abs());
+        Self {
+            median: middle,
+            reach: LEVEL_REACH * apart.max(rounding),
+        }
+    }
+
+    fn contain(&self, level: f64) -> bool {
+        (level - self.median).abs() <= self.reach
+    }
+}
+
+/// The places of an object without the levels that are far from most others of it: what lies
+/// between them is not predicted from these.
+pub(crate) fn without_unusual_levels(places: &[ModelPlace]) -> Cow<'_, [ModelPlace]> {
+    let channels = by_channel(places.iter().flat_map(|place| &place.levels));
+    let usual: BTreeMap<u16, UsualLevels> = { channels.iter() }
+        .map(|(channel, levels)| (*channel, UsualLevels::new(levels)))
+        .collect();
+    let is_usual = |level: &LevelMemory| usual[&level.channel].contain(level.mean);
+    if places.iter().flat_map(|place| &place.levels).all(is_usual) {
+        return Cow::Borrowed(places);
+    }
+    let mut places = places.to_vec();
+    for place in &mut places {
+        place.levels.retain(is_usual);
+    }
+    Cow::Owned(places)
+}
+
+impl Component {
+    /// One of these levels of an object with so many.
+    fn new(levels: &[f64], of: usize) -> Self {
+        let count = levels.len() as f64;
+        let mean = levels.iter().sum::<f64>() / count;
+        Self {
+            share: count / of as f64,
+            count,
+            mean,
+            squares: levels.iter().map(|level| (level - mean).powi(2)).sum(),
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        let count = self.count + other.count;
+        let apart = other.mean - self.mean;
+        self.squares += other.squares + apart * apart * self.count * other.count / count;
+        self.mean += apart * other.count / count;
+        self.count = count;
+        self.share += other.share;
+    }
+
+    fn variance(&self) -> f64 {
+        self.squares / self.count + LEVEL_ROUNDING * (1.0 + self.mean * self.mean)
+    }
+
+    /// Order of magnitude: powers of ten by which the root mean square is above a millionth.
+    fn magnitude(&self) -> u32 {
+        let square = self.mean * self.mean + self.squares / self.count;
+        floor_u32(0.5 * (square / LEVEL_ROUNDING).log10())
+    }
+
+    /// Its part in the density of a reading at its mean, and how much less it is at the reading,
+    /// as a log.
+    fn density(&self, reading: &LevelReading) -> (f64, f64) {
+        let apart = reading.value - self.mean;
+        let variance = self.variance() + reading.sd * reading.sd;
+        (
+            self.share / variance.sqrt(),
+            -0.5 * apart * apart / variance,
+        )
+    }
 }
 
 impl LevelPrior {
+    /// Of the levels of an object, one for each place.
+    fn of_object(channel: u16, levels: Vec<f64>) -> Self {
+        let count = levels.len();
+        let usual = UsualLevels::new(&levels);
+        let (usual, others): (Vec<f64>, Vec<f64>) =
+            levels.into_iter().partition(|level| usual.contain(*level));
+        let parts = [usual, others];
+        let parts = parts.iter().filter(|levels| !levels.is_empty());
+        Self {
+            channel,
+            components: parts.map(|levels| Component::new(levels, count)).collect(),
+        }
+    }
+
+    /// Variance of the noise of a reading: its own, and a part of that of the levels like it.
+    pub(crate) fn noise(&self, reading: &LevelReading) -> f64 {
+        let log = |component: &Component| {
+            let (most, log) = component.density(reading);
+            most.ln() + log
+        };
+        let like = match &self.components[..] {
+            [only] => Some(only),
+            several => { several.iter() }.max_by(|a, b| log(a).total_cmp(&log(b))),
+        };
+        let floor = like.map_or(0.0, |like| like.variance() * LEVEL_VARIANCE_FLOOR);
+        reading.sd * reading.sd + floor
+    }
+
     /// Density of a level anywhere, times √(2π).
     pub(crate) fn density(&self, reading: &LevelReading) -> f64 {
-        let apart = reading.value - self.mean;
-        let variance = self.variance + reading.sd * reading.sd;
-        // The floor takes values far off all others for misreadings.
-        ((-0.5 * apart * apart / variance).exp() + LEVEL_DENSITY_FLOOR) / variance.sqrt()
+        let mut sum = 0.0;
+        let mut floor = (0.0, 0.0);
+        for component in &self.components {
+            let (most, log) = component.density(reading);
+            sum += most * log.exp();
+            if component.share > floor.0 {
+                floor = (component.share, most);
+            }
+        }
+        // Values far off all others are taken for misreadings.
+        sum + LEVEL_DENSITY_FLOOR * floor.1
     }
 }
 
@@ -42,28 +188,112 @@ pub(crate) fn likelihood_below_one(
     ratios.product()
 }
 
-/// Distributions of these levels, one of each channel for each place, by channel.
-pub(crate) fn level_prior<'a>(levels: impl Iterator<Item = &'a LevelMemory>) -> Vec<LevelPrior> {
-    let mut all: Vec<LevelMemory> = Vec::new();
+/// Distributions of the levels of an object, one of each channel for each place, by channel.
+pub(crate) fn object_levels<'a>(levels: impl Iterator<Item = &'a LevelMemory>) -> Vec<LevelPrior> {
+    { by_channel(levels).into_iter() }
+        .map(|(channel, levels)| LevelPrior::of_object(channel, levels))
+        .collect()
+}
+
+fn by_channel<'a>(levels: impl Iterator<Item = &'a LevelMemory>) -> BTreeMap<u16, Vec<f64>> {
+    let mut channels: BTreeMap<u16, Vec<f64>> = BTreeMap::new();
     for level in levels {
-        match all.iter_mut().find(|sum| sum.channel == level.channel) {
-            Some(sum) => {
-                sum.count += 1.0;
-                let apart = level.mean - sum.mean;
-                sum.mean += apart / sum.count;
-                sum.squares += apart * (level.mean - sum.mean);
-            }
-            None => all.push(LevelMemory {
-                count: 1.0,
-                squares: 0.0,
-                ..*level
-            }),
+        channels.entry(level.channel).or_default().push(level.mean);
+    }
+    channels
+}
+
+/// Distributions of the levels of all objects, by channel. Each object has an equal part.
+pub(crate) fn level_prior<'a>(objects: impl Iterator<Item = &'a LevelPrior>) -> Vec<LevelPrior> {
+    let mut channels: BTreeMap<u16, (f64, BTreeMap<u32, Component>)> = BTreeMap::new();
+    for object in objects {
+        let (count, groups) = channels.entry(object.channel).or_default();
+        *count += 1.0;
+        for component in &object.components {
+            { groups.entry(component.magnitude()) }
+                .and_modify(|group| group.add(component))
+                .or_insert(*component);
         }
     }
-    let level_prior = |sum: LevelMemory| LevelPrior {
-        channel: sum.channel,
-        mean: sum.mean,
-        variance: sum.squares / sum.count + 1e-12,
-    };
-    all.into_iter().map(level_prior).collect()
+    { channels.into_iter() }
+        .map(|(channel, (count, groups))| {
+            let component = |group: Component| Component {
+                share: group.share / count,
+                ..group
+            };
+            LevelPrior {
+                channel,
+                components: groups.into_values().map(component).collect(),
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn object(levels: &[f64]) -> Vec<LevelPrior> {
+        let level = |mean: &f64| LevelMemory {
+            channel: 3,
+            count: 1.0,
+            mean: *mean,
+            squares: 0.0,
+            noise: 0.01,
+        };
+        let levels: Vec<_> = levels.iter().map(level).collect();
+        object_levels(levels.iter())
+    }
+
+    fn library(objects: &[Vec<f64>]) -> LevelPrior {
+        let objects: Vec<_> = objects.iter().flat_map(|levels| object(levels)).collect();
+        let mut priors = level_prior(objects.iter());
+        assert_eq!(priors.len(), 1);
+        priors.pop().expect("one channel has levels")
+    }
+
+    fn reading(value: f64) -> LevelReading {
+        LevelReading {
+            channel: 3,
+            value,
+            sd: 0.1,
+        }
+    }
+
+    #[test]
+    fn levels_of_one_kind_have_the_normal_distribution_of_all() {
+        let levels = [vec![-1.5, 2.0, 0.25], vec![1.0, -3.5, 4.0, 1.5, -2.0]];
+        let prior = library(&levels);
+        let all = levels.concat();
+        let mean = all.iter().sum::<f64>() / 8.0;
+        let variance = all.iter().map(|level| (level - mean).powi(2)).sum::<f64>() / 8.0;
+        for value in [-4.0, 0.0, 0.3, 7.0, 1e9] {
+            let variance = variance + 0.01;
+            let exponent: f64 = -0.5 * (value - mean).powi(2) / variance;
+            let expected = (exponent.exp() + LEVEL_DENSITY_FLOOR) / variance.sqrt();
+            let density = prior.density(&reading(value));
+            assert!((density / expected - 1.0).abs() < 1e-9, "{value}");
+        }
+        let noise = prior.noise(&reading(0.3));
+        assert!((noise - 0.01 - LEVEL_VARIANCE_FLOOR * variance).abs() < 1e-15);
+    }
+
+    #[test]
+    fn levels_far_from_all_others_take_their_part_and_no_more() {
+        let own = vec![-1.5, 2.0, 0.25, 1.0];
+        let alone = library(std::slice::from_ref(&own));
+        for far in [1e4, -1e9, 1e30] {
+            // Another object, and one level in five of the same.
+            let other = library(&[own.clone(), vec![far, -far, far]]);
+            let same = library(&[[own.clone(), vec![far]].concat()]);
+            for (prior, part) in [(other, 0.5), (same, 0.8)] {
+                for value in [-1.0, 0.0, 1.7] {
+                    let ratio = prior.density(&reading(value)) / alone.density(&reading(value));
+                    assert!((ratio - part).abs() < 1e-3, "{far} {value}: {ratio}");
+                    let noise = prior.noise(&reading(value));
+                    assert!((noise / alone.noise(&reading(value)) - 1.0).abs() < 1e-9);
+                }
+            }
+        }
+    }
 }

@@ -174,7 +174,7 @@ impl ObjectLibrary {
         };
         self.samples = samples.filter_map(sample).collect();
         let models = self.objects.values().map(|object| &object.indexed);
-        let prior = level_prior(models.flat_map(IndexedModel::levels));
+        let prior = level_prior(models.flat_map(|indexed| &indexed.own_levels));
         self.level_prior = prior;
     }
 

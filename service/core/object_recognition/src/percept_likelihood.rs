@@ -4,14 +4,12 @@ use nalgebra::UnitQuaternion;
 use pulp::Arch;
 
 use crate::contact::{Contact, LevelReading};
-use crate::index::packed_places::{PackedPlace, PackedPlaces};
+use crate::index::packed_places::{PackedPlace, PackedPlaces, packed_level, packed_level_variance};
 use crate::indexed_model::IndexedModel;
 use crate::level_prior::LevelPrior;
 use crate::model::LevelMemory;
 use crate::numeric::{exp, to_f32};
-use crate::tuning::{
-    LEVEL_VARIANCE_FLOOR, NORMAL_VARIANCE, SPARSE_RATIOS, WRONG_NORMAL_SHARE, WRONG_PERCEPT_SHARE,
-};
+use crate::tuning::{NORMAL_VARIANCE, SPARSE_RATIOS, WRONG_NORMAL_SHARE, WRONG_PERCEPT_SHARE};
 
 /// Places that are evaluated at once.
 pub(crate) const LANES: usize = 8;
@@ -81,7 +79,7 @@ impl<'a> ContactPercepts<'a> {
             Some(Level {
                 channel: reading.channel,
                 value: reading.value,
-                noise: reading.sd * reading.sd + level_prior.variance * LEVEL_VARIANCE_FLOOR,
+                noise: level_prior.noise(reading),
                 scale: (1.0 - WRONG_PERCEPT_SHARE) / level_prior.density(anywhere),
             })
         };
@@ -104,8 +102,8 @@ impl<'a> ContactPercepts<'a> {
             Some((channel, middle)) => { levels.iter() }
                 .find(|level| level.channel == channel)
                 .map_or(PerceptForm::Nothing, |level| PerceptForm::Level {
-                    value: to_f32(level.value - middle),
-                    noise: to_f32(level.noise),
+                    value: packed_level(level.value - middle),
+                    noise: packed_level_variance(level.noise),
                     scale: to_f32(level.scale),
                 }),
         };
@@ -297,7 +295,7 @@ mod tests {
     use nalgebra::{Point3, Unit, Vector3};
 
     use super::*;
-    use crate::level_prior::level_prior;
+    use crate::level_prior::{level_prior, object_levels};
     use crate::model::ModelPlace;
     use crate::{ModelSettings, ObjectModel};
 
@@ -341,7 +339,7 @@ mod tests {
                 IndexedModel::new(&model)
             })
             .collect();
-        let level_prior = level_prior(indexed_models.iter().flat_map(IndexedModel::levels));
+        let level_prior = level_prior(indexed_models.iter().flat_map(|own| &own.own_levels));
         let bare = Contact::at(Point3::origin(), 0.001);
         let contacts = [
             bare.clone(),
@@ -395,11 +393,8 @@ mod tests {
             };
             let model = ObjectModel::with_places(ModelSettings::default(), 0.004, vec![place]);
             let indexed = IndexedModel::new(&model);
-            let level_prior = [LevelPrior {
-                channel: 0,
-                mean: 1.0,
-                variance: 4.0,
-            }];
+            let levels = [level(0, -1.0), level(0, 3.0)];
+            let level_prior = level_prior(object_levels(levels.iter()).iter());
             let contact = |value| Contact::at(Point3::origin(), 0.001).with_level(0, value, 0.1);
             let (own, other) = (contact(2.1), contact(4.0));
             let right = |percepts: &ContactPercepts<'_>| {

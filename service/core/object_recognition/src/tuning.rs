@@ -56,8 +56,14 @@ pub(crate) const WRONG_PERCEPT_SHARE: f64 = 0.05;
 /// Scale of one less the cosine of two descriptors of one place: noise of a tenth costs 0.01 of it,
 /// half another view 0.3. Chosen.
 pub(crate) const DESCRIPTOR_SCALE: f64 = 0.05;
-/// Part of the variance of all levels that is added to that of each reading, so that exact readings
-/// have a density. Chosen.
+/// Least variance of levels, per one and the square of their mean: rounding. Chosen.
+pub(crate) const LEVEL_ROUNDING: f64 = 1e-12;
+/// Distance of a level from the median of its object beyond which it is no level of its kind, in
+/// median distances: no sensor resolves a thousandth of its range at most places and needs more
+/// than the whole at others. Chosen.
+pub(crate) const LEVEL_REACH: f64 = 1e3;
+/// Part of the variance of levels like it that is added to that of each reading, so that exact
+/// readings have a density. Chosen.
 pub(crate) const LEVEL_VARIANCE_FLOOR: f64 = 1e-6;
 /// Floor of the density of a level anywhere, per that at the mean: a value far off all others is a
 /// misreading. Chosen.

@@ -25,6 +25,7 @@ pub use label::Label;
 pub use motion::{Motion, StartPose};
 pub use noisy_pose::{NoisyPose, PoseNoise};
 pub use object_mark::{ObjectMark, Spacing, TouchNoise};
+pub(crate) use percept::LEVEL_MAX;
 pub use percept::{Descriptor, Level};
 pub use range::Range;
 pub use record::{Record, SkipReason};

@@ -8,6 +8,10 @@ use super::{InvalidSample, Label};
 /// Shortest and longest descriptor.
 const DESCRIPTOR_LEN: std::ops::RangeInclusive<usize> = 8..=4096;
 
+/// The largest level that places and objects remember, in either direction: no unit makes larger
+/// ones, and a program's largest float, sent for "nothing", is beyond it.
+pub(crate) const LEVEL_MAX: f64 = 1e30;
+
 /// A scalar on a channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Level {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::{Descriptor, InvalidSample, Label, Level, Spacing, TouchNoise};
+use super::{Descriptor, InvalidSample, LEVEL_MAX, Label, Level, Spacing, TouchNoise};
 use object_recognition::{Contact, DescriptorReading, LevelReading, Reached};
 
 /// Largest coordinate \[m\].
@@ -108,14 +108,16 @@ impl Touch {
         self
     }
 
-    /// As a contact, with channels by number; one without a number is left out.
+    /// As a contact, with channels by number; one without a number is left out, and a level that no
+    /// object would remember.
     pub(crate) fn contact(&self, mut number: impl FnMut(&Label) -> Option<u16>) -> Contact {
         let mut contact = Contact::at(self.position, self.noise.position_sd_m());
         contact.drift_sd_m = self.drift_sd_m;
         contact.normal = self.normal;
         contact.normal_sd_rad = self.noise.normal_sd_rad();
         contact.reached = self.reached;
-        for level in &self.levels {
+        let is_sense = |level: &&TouchLevel| level.value.abs() <= LEVEL_MAX;
+        for level in self.levels.iter().filter(is_sense) {
             let felt = number(&level.channel).map(|channel| LevelReading {
                 channel,
                 value: level.value,

@@ -5,6 +5,7 @@
     reason = "clippy knows test functions, but not what they call"
 )]
 
+mod absurd_levels;
 mod any_journal; // arbitrary journals
 mod astray; // robots that are carried off
 mod budgets; // what is forgotten, and when

@@ -37,7 +37,7 @@ pub(crate) fn noise() -> TouchNoise {
     TouchNoise::new(0.001, 0.02, 0.2).unwrap()
 }
 
-fn learn(name: Option<&str>) -> SampleBody {
+pub(crate) fn learn(name: Option<&str>) -> SampleBody {
     SampleBody::Object(ObjectMark::Learn {
         name: name.map(label),
         spacing: Spacing::new(0.01).unwrap(),
@@ -59,7 +59,7 @@ fn identify_or_learn(learns: bool) -> SampleBody {
     })
 }
 
-fn end() -> SampleBody {
+pub(crate) fn end() -> SampleBody {
     SampleBody::Object(ObjectMark::End)
 }
 
@@ -132,7 +132,7 @@ fn what_looks_like_another_object_is_found() {
     assert!((density.gap_m - PITCH_M).abs() < 0.002, "{density:?}");
 }
 
-fn recognised(events: &[EventKind]) -> Vec<&str> {
+pub(crate) fn recognised(events: &[EventKind]) -> Vec<&str> {
     let names = events.iter().filter_map(|event| match event {
         EventKind::ObjectRecognised { name, .. } => Some(name.as_str()),
         _ => None,

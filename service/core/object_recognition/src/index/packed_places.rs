@@ -28,6 +28,20 @@ pub(crate) struct PackedPlace {
     pub(crate) level_variance: f32,
 }
 
+/// A level relative to a model's in single precision, in which the square of any other's distance
+/// to it is a number.
+pub(crate) fn packed_level(level: f64) -> f32 {
+    to_f32(level.clamp(-PACKED_LEVEL_MAX, PACKED_LEVEL_MAX))
+}
+
+/// A variance of such levels.
+pub(crate) fn packed_level_variance(variance: f64) -> f32 {
+    to_f32(variance.min(PACKED_LEVEL_MAX * PACKED_LEVEL_MAX))
+}
+
+/// Levels farther from a model's are taken for as far.
+const PACKED_LEVEL_MAX: f64 = 1e18;
+
 /// Places of a model in the order of the lattice index.
 #[derive(Clone, Debug)]
 pub(crate) struct PackedPlaces {
@@ -72,8 +86,11 @@ impl PackedPlaces {
         let packed_place = |place: &IndexedPlace| PackedPlace {
             at: (place.position - middle).map(to_f32).into(),
             variance_m2: to_f32(place.variance_m2),
-            level: levels.map_or(0.0, |(_, middle)| to_f32(place.levels[0].mean - middle)),
-            level_variance: levels.map_or(1.0, |_| to_f32(place.levels[0].variance())),
+            level: levels.map_or(0.0, |(_, middle)| {
+                packed_level(place.levels[0].mean - middle)
+            }),
+            level_variance: levels
+                .map_or(1.0, |_| packed_level_variance(place.levels[0].variance())),
         };
         let normal = |place: &IndexedPlace| {
             let normal = place.normal.map(|normal| normal.map(to_f32).into());

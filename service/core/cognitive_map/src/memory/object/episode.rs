@@ -8,7 +8,7 @@ use super::joined::is_clear;
 use super::joining::Insight;
 use super::memory::{Identified, ObjectMemory};
 use crate::input::TouchNoise;
-use crate::input::{Descriptor, Label, Level};
+use crate::input::{Descriptor, LEVEL_MAX, Label, Level};
 use crate::memory::strength::Clock;
 use geometry::MotionSum;
 use object_recognition::{
@@ -166,7 +166,9 @@ impl Episode {
             let normal: Vector3<f64> = self.travel.motion().rotation * normal.into_inner();
             contact = contact.with_normal(Unit::new_normalize(normal), self.noise.normal_sd_rad());
         }
-        if let Some(channel) = memory.open_channel(level.channel()) {
+        if level.value().abs() <= LEVEL_MAX
+            && let Some(channel) = memory.open_channel(level.channel())
+        {
             contact.levels.push(LevelReading {
                 channel,
                 value: level.value(),

@@ -131,10 +131,6 @@ fn id_of(index: usize) -> PlaceId {
     PlaceId(u32::try_from(index).expect("places have identifiers of 32 bits"))
 }
 
-/// The largest level that places remember, in either direction: no unit makes larger ones, and a
-/// program's largest float, sent for "nothing", is beyond it.
-pub(super) const LEVEL_MAX: f64 = 1e30;
-
 /// Distance of a level from what is expected, in deviations; `sd_floor` is the least deviation.
 pub(super) fn surprise(levels: &Moments, value: f64, sd_floor: f64) -> f64 {
     (value - levels.mean()).abs() / levels.sd().max(sd_floor)

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::descriptor::{Block, DescriptorMemory, Seen};
-use super::level::{LEVEL_MAX, LevelMemory, LevelTrace, Sensed, surprise};
+use super::level::{LevelMemory, LevelTrace, Sensed, surprise};
 use super::{Channel, ChannelId, ChannelKind, Expected, FeltPercept, PerceptCue, Remembered};
-use crate::input::{Descriptor, Label};
+use crate::input::{Descriptor, LEVEL_MAX, Label};
 use crate::memory::ids::PlaceId;
 use place_filter::{HeadingModel, Kernel, Stretch, Trace};
 use state::{CorruptState, PageItems, PagedVec, StateWriter};
