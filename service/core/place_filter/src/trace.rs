@@ -44,14 +44,28 @@ impl Trace {
         }
     }
 
+    /// Whether a level was sensed here that is one of the channel.
+    pub fn is_known(&self) -> bool {
+        self.weight > 0.0
+    }
+
+    /// Of a place about which nothing was sensed yet.
+    pub fn unknown(offset_m: Vector3<f64>, spread_m2: f64, teacher: u32) -> Self {
+        Self {
+            weight: 0.0,
+            ..Self::new(0.0, offset_m, spread_m2, teacher)
+        }
+    }
+
     /// A further one.
     pub fn learn(&mut self, value: f64, offset_m: Vector3<f64>, spread_m2: f64, teacher: u32) {
         let known_m2 = self.spread_m2 + tuning::POSITION_M2;
         let new_m2 = spread_m2 + tuning::POSITION_M2;
-        if new_m2 > tuning::LESS_SURE * known_m2 {
+        let is_first = !self.is_known();
+        if !is_first && new_m2 > tuning::LESS_SURE * known_m2 {
             return;
         }
-        if known_m2 > tuning::LESS_SURE * new_m2 {
+        if is_first || known_m2 > tuning::LESS_SURE * new_m2 {
             *self = Self::new(value, offset_m, spread_m2, teacher);
             return;
         }

@@ -19,8 +19,15 @@ pub(crate) mod channel {
     pub(crate) const SPREAD_MIN: f64 = 0.01;
     /// Distances with enough pairs that a model needs.
     pub(crate) const LAGS_MIN: usize = 4;
-    /// A difference counts up to so many deviations of the channel: a sensor's sentinel is none.
+    /// A level or a difference is one of the channel up to so many deviations of it: a sensor's
+    /// sentinel is none.
     pub(crate) const FAR: f64 = 6.0;
+    /// Levels from which on a channel tells what is usual: some forty metres of way, since robots
+    /// that have hardly moved know little of what there is.
+    pub(crate) const USUAL_MIN: u64 = 256;
+    /// A level counts up to so many deviations in those of the channel, so that some sentinels in a
+    /// hundred widen them little, and a channel that changes is followed all the same.
+    pub(crate) const COUNTED_MAX: f64 = 3.0;
     /// Levels after which one is bounded before it counts.
     pub(crate) const LEVELS_MIN: u64 = 16;
     /// Levels over which mean and deviation of a channel are taken, about.

@@ -1,6 +1,6 @@
 //! What a channel is like, learned from levels of one way.
 
-use state::{Moments, state_of_struct};
+use state::{Moments, Teachers, state_of_struct};
 
 use crate::kernel::Kernel;
 use crate::tuning::channel as tuning;
@@ -13,6 +13,7 @@ pub struct Variogram {
     lags_m: [f64; tuning::LAGS],
     halves: [f64; tuning::LAGS],
     levels: Moments,
+    teachers: Teachers,
     kernel: Option<Kernel>,
 }
 
@@ -21,6 +22,7 @@ state_of_struct!(Variogram {
     lags_m,
     halves,
     levels,
+    teachers,
     kernel
 });
 
@@ -28,6 +30,39 @@ impl Variogram {
     /// The model of the channel; `None` while it is not known, or says nothing.
     pub fn kernel(&self) -> Option<&Kernel> {
         self.kernel.as_ref()
+    }
+
+    /// Whether a level is like those of the channel. One far off all others, as a sensor sends for
+    /// "nothing", tells nothing of a place; if there are many, the channel has changed.
+    pub fn is_usual(&self, value: f64) -> bool {
+        let deviation = self.levels.sd();
+        let is_known = self.levels.count() >= tuning::USUAL_MIN && deviation > 0.0;
+        !is_known || (value - self.levels.mean()).abs() <= tuning::FAR * deviation
+    }
+
+    /// Hears a level of an agent; whether it is usual. One that is not counts without its place, if
+    /// it is not one agent's word against that of others.
+    pub fn hear(&mut self, value: f64, agent: u32) -> bool {
+        let is_usual = self.is_usual(value);
+        if self.teachers.hear(agent, is_usual) && !is_usual {
+            self.count(value);
+        }
+        is_usual
+    }
+
+    fn count(&mut self, value: f64) {
+        let (mean, most) = (self.levels.mean(), tuning::COUNTED_MAX * self.levels.sd());
+        let is_known = self.levels.count() >= tuning::LEVELS_MIN && most > 0.0;
+        let counted = if is_known {
+            value.clamp(mean - most, mean + most)
+        } else {
+            value
+        };
+        self.levels.fade(1.0 - 1.0 / tuning::LEVELS);
+        self.levels.add(counted, 1.0);
+        if self.levels.count().is_multiple_of(tuning::REFIT) {
+            self.kernel = self.fit().filter(Kernel::tells);
+        }
     }
 
     /// Takes in a level, and how far from it each of some earlier ones was \[m\].
@@ -60,12 +95,7 @@ impl Variogram {
             self.lags_m[lag] += share * (distance_m - self.lags_m[lag]);
             self.halves[lag] += share * (0.5 * difference * difference - self.halves[lag]);
         }
-        let value = bounded(value, self.levels.mean());
-        self.levels.fade(1.0 - 1.0 / tuning::LEVELS);
-        self.levels.add(value, 1.0);
-        if self.levels.count().is_multiple_of(tuning::REFIT) {
-            self.kernel = self.fit().filter(Kernel::tells);
-        }
+        self.count(value);
     }
 
     /// The model that fits best (weighted least squares after Cressie 1985):
@@ -151,4 +181,96 @@ fn line(rows: impl Iterator<Item = (f64, f64, f64)> + Clone, least: f64) -> (f64
     }
     let cost = rows.map(|(x, y, weight)| weight * (y - a - b * x).powi(2));
     (a, b, cost.sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Levels of a field along a lane, each with those up to 1.2 m before.
+    fn explore(
+        variogram: &mut Variogram,
+        agent: u32,
+        count: u32,
+        sensed: impl Fn(u32, f64) -> f64,
+    ) -> u32 {
+        let mut way: Vec<(f64, f64)> = Vec::new();
+        let mut unusual = 0;
+        for number in 0..count {
+            let at = 0.1 * f64::from(number);
+            let noise = 0.05 * (f64::from(number) * 97.3).sin();
+            let value = sensed(number, 5.0 + (1.3 * at).sin() + (0.9 * at).cos() + noise);
+            if !variogram.hear(value, agent) {
+                unusual += 1;
+                continue;
+            }
+            let earlier = way.iter().rev().take(12);
+            variogram.learn(value, earlier.map(|(from, level)| (at - from, *level)));
+            way.push((at, value));
+        }
+        unusual
+    }
+
+    type Sensed = fn(u32, f64) -> f64;
+
+    fn honest(_: u32, level: f64) -> f64 {
+        level
+    }
+
+    fn is_like(one: &Variogram, other: &Variogram) -> bool {
+        let (Some(one), Some(other)) = (one.kernel(), other.kernel()) else {
+            return false;
+        };
+        let ratios = [one.sill / other.sill, one.length_m / other.length_m];
+        (one.mean - other.mean).abs() < 0.3 && ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.3)
+    }
+
+    fn learned() -> Variogram {
+        let mut variogram = Variogram::default();
+        assert_eq!(explore(&mut variogram, 0, 2000, honest), 0);
+        assert!(variogram.kernel().is_some());
+        variogram
+    }
+
+    #[test]
+    fn one_agents_errors_leave_what_a_channel_is_like() {
+        let before = learned();
+        let errors: [Sensed; 4] = [
+            |_, level| 1000.0 * level,
+            |_, _| -9999.0,
+            |number, level| if number % 20 == 7 { -9999.0 } else { level },
+            |number, _| if number % 2 == 0 { 1e29 } else { -1e29 },
+        ];
+        for sensed in errors {
+            let mut variogram = before;
+            let unusual = explore(&mut variogram, 1, 3000, sensed);
+            assert!(unusual >= 150, "{unusual}");
+            assert!(is_like(&variogram, &before), "{variogram:?}");
+            assert_eq!(explore(&mut variogram, 0, 500, honest), 0);
+        }
+    }
+
+    #[test]
+    fn a_change_that_two_agents_sense_is_followed_and_so_is_that_of_the_only_one() {
+        let change = |_: u32, level: f64| 50.0 + 3.0 * level;
+        let mut variogram = learned();
+        for _ in 0..40 {
+            explore(&mut variogram, 1, 100, change);
+            explore(&mut variogram, 2, 100, change);
+        }
+        assert_eq!(explore(&mut variogram, 1, 100, change), 0);
+        let mut variogram = learned();
+        explore(&mut variogram, 0, 8000, change);
+        assert_eq!(explore(&mut variogram, 0, 100, change), 0);
+    }
+
+    #[test]
+    fn what_nobody_contests_is_followed_in_the_end() {
+        let change = |_: u32, level: f64| 50.0 + 3.0 * level;
+        let mut variogram = learned();
+        let contested = explore(&mut variogram, 1, 3000, change);
+        assert_eq!(contested, 3000);
+        explore(&mut variogram, 1, 30_000, change);
+        assert_eq!(explore(&mut variogram, 1, 100, change), 0);
+    }
 }

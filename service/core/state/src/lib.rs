@@ -11,6 +11,7 @@ mod paged;
 mod slab;
 mod sparse;
 mod summary;
+mod teachers;
 
 pub use bytes::{CorruptState, ITEMS_MAX, State, StateReader, StateWriter, read_list, write_list};
 pub use codec::{Codec, Counted, Unstored};
@@ -20,3 +21,4 @@ pub use paged::{PagedVec, write_page};
 pub use slab::{NONE, Slab, Slot};
 pub use sparse::{PageItems, SparseVec};
 pub use summary::{Summary, SummaryTree, merged};
+pub use teachers::Teachers;

@@ -60,7 +60,7 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// compasses, version 24 not what a turn of the body changes in views, version 25 no bias that is
 /// read at a stand and no evidence of places of beacons, version 26 not when claims were tried
 /// last.
-const VERSION: u16 = 27;
+const VERSION: u16 = 28;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

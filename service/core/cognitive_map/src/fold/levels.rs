@@ -63,6 +63,10 @@ impl Fold<'_> {
         if self.head((channel, level.value()), &in_odom) {
             return self.go_on_seeking();
         }
+        let heard = (level.value(), number);
+        if !self.percepts.hear(channel, heard, self.revision) {
+            return self.go_on_seeking();
+        }
         let sensed = SensedLevel {
             channel,
             value: level.value(),

@@ -204,6 +204,35 @@ fn a_robot_that_wakes_up_is_found_in_its_room_and_in_no_other() {
 }
 
 #[test]
+fn sentinels_and_another_unit_of_one_robot_leave_the_others_found() {
+    let room = room(2);
+    let map = explored(&room);
+    let wrong: [Sensors; 3] = [
+        |_, level, random| {
+            if random.uniform() < 0.3 {
+                -9999.0
+            } else {
+                level
+            }
+        },
+        |_, level, _| 1000.0 * level,
+        |_, _, random| if random.uniform() < 0.5 { 1e29 } else { -1e29 },
+    ];
+    for sensors in wrong {
+        let mut map = map.clone();
+        let mut bad = Walker::told(&mut map, [3.0, 3.0], 0.4, 9);
+        bad.sensors = sensors;
+        bad.roam(&mut map, &room, 1500);
+        for (seed, at) in [(1, [2.0, 2.5]), (2, [5.5, 3.0]), (3, [4.0, 6.0])] {
+            let mut walker = Walker::untold(&mut map, at, 2.0 * seed as f64, seed);
+            walker.roam(&mut map, &room, 80);
+            assert!(walker.is_placed(&map), "{seed}");
+            assert!(walker.off_m(&map) < 0.3, "{seed}: {}", walker.off_m(&map));
+        }
+    }
+}
+
+#[test]
 fn a_robot_that_comes_from_where_nobody_was_is_found_inside() {
     let here = room(2);
     let map = explored(&here);

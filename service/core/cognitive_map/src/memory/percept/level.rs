@@ -66,21 +66,28 @@ impl LevelMemory {
         self.traces.get(place.0 as usize)
     }
 
-    /// Strengthens the association of a place and a level.
-    pub(super) fn strengthen(&mut self, sensed: &Sensed, revision: u64) {
+    /// Strengthens the association of a place and a level. One that is not usual on the channel
+    /// tells nobody where it is.
+    pub(super) fn strengthen(&mut self, sensed: &Sensed, is_usual: bool, revision: u64) {
         let place = sensed.place.0 as usize;
         let (value, weight) = (sensed.value, sensed.weight);
         let (offset_m, spread_m2) = (sensed.offset_m, sensed.spread_m2);
         if let Some(trace) = self.traces.get_mut(place, revision) {
             trace.levels.add(value, weight);
-            trace.felt.learn(value, offset_m, spread_m2, sensed.agent);
+            if is_usual {
+                trace.felt.learn(value, offset_m, spread_m2, sensed.agent);
+            }
             // The clocks of two agents may differ, so a later one may carry an earlier stamp.
             trace.last_stamp_ns = trace.last_stamp_ns.max(sensed.stamp_ns);
             return;
         }
         let mut levels = Moments::default();
         levels.add(value, weight);
-        let felt = Trace::new(value, offset_m, spread_m2, sensed.agent);
+        let felt = if is_usual {
+            Trace::new(value, offset_m, spread_m2, sensed.agent)
+        } else {
+            Trace::unknown(offset_m, spread_m2, sensed.agent)
+        };
         let trace = LevelTrace {
             levels,
             felt,

@@ -85,7 +85,7 @@ impl PerceptMap {
             percepts: trace.levels.count(),
             surprise: surprise(&trace.levels, value, record.level_sd_floor()),
         });
-        memory.strengthen(sensed, revision);
+        memory.strengthen(sensed, record.variogram.is_usual(value), revision);
         record.learn_level(value, weight);
         compared
     }
@@ -108,6 +108,12 @@ impl PerceptMap {
         if let Some(channel) = self.channels.get_mut(usize::from(channel), revision) {
             channel.variogram.learn(value, earlier);
         }
+    }
+
+    /// A channel hears a level of an agent; whether it is like those of the channel.
+    pub(crate) fn hear(&mut self, channel: u8, (value, agent): (f64, u32), revision: u64) -> bool {
+        let channel = self.channels.get_mut(usize::from(channel), revision);
+        channel.is_none_or(|channel| channel.variogram.hear(value, agent))
     }
 
     /// A channel learns whether its levels tell the heading.
@@ -137,7 +143,7 @@ impl PerceptMap {
     /// What a place remembers of a channel, for who finds out where it is.
     pub(crate) fn trace(&self, place: PlaceId, channel: u8) -> Option<&Trace> {
         match self.memories.get(usize::from(channel))? {
-            Memory::Levels(memory) => Some(&memory.get(place)?.felt),
+            Memory::Levels(memory) => Some(&memory.get(place)?.felt).filter(|felt| felt.is_known()),
             Memory::Descriptors(_) => None,
         }
     }
