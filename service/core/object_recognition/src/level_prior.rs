@@ -7,7 +7,8 @@ use crate::contact::{Contact, LevelReading};
 use crate::model::{LevelMemory, ModelPlace};
 use crate::numeric::floor_u32;
 use crate::tuning::{
-    LEVEL_DENSITY_FLOOR, LEVEL_REACH, LEVEL_ROUNDING, LEVEL_VARIANCE_FLOOR, WRONG_PERCEPT_SHARE,
+    LEVEL_DENSITY_FLOOR, LEVEL_MAX, LEVEL_REACH, LEVEL_ROUNDING, LEVEL_VARIANCE_FLOOR,
+    UNUSUAL_SHARE_MAX, WRONG_PERCEPT_SHARE,
 };
 
 /// Distribution of the levels of a channel over the places of an object or of a library: a mixture
@@ -50,10 +51,19 @@ impl UsualLevels {
         let middle = median(levels.to_vec());
         let apart = median(levels.iter().map(|level| (level - middle).abs()).collect());
         let rounding = LEVEL_ROUNDING.sqrt() * (1.0 + middle.abs());
-        Self {
+        let usual = Self {
             median: middle,
             reach: LEVEL_REACH * apart.max(rounding),
+        };
+        // Where most are equal, others may be as good: a dot on a plain surface.
+        let far = levels.iter().filter(|level| !usual.contain(**level));
+        if far.count() as f64 > UNUSUAL_SHARE_MAX * levels.len() as f64 {
+            return Self {
+                reach: f64::INFINITY,
+                ..usual
+            };
         }
+        usual
     }
 
     fn contain(&self, level: f64) -> bool {
@@ -155,16 +165,16 @@ impl LevelPrior {
     /// Density of a level anywhere, times √(2π).
     pub(crate) fn density(&self, reading: &LevelReading) -> f64 {
         let mut sum = 0.0;
-        let mut floor = (0.0, 0.0);
+        let mut likest = (f64::NEG_INFINITY, 0.0);
         for component in &self.components {
             let (most, log) = component.density(reading);
             sum += most * log.exp();
-            if component.share > floor.0 {
-                floor = (component.share, most);
+            if likest.1 == 0.0 || most.ln() + log > likest.0 {
+                likest = (most.ln() + log, most);
             }
         }
         // Values far off all others are taken for misreadings.
-        sum + LEVEL_DENSITY_FLOOR * floor.1
+        sum + LEVEL_DENSITY_FLOOR * likest.1
     }
 }
 
@@ -198,7 +208,8 @@ pub(crate) fn object_levels<'a>(levels: impl Iterator<Item = &'a LevelMemory>) -
 fn by_channel<'a>(levels: impl Iterator<Item = &'a LevelMemory>) -> BTreeMap<u16, Vec<f64>> {
     let mut channels: BTreeMap<u16, Vec<f64>> = BTreeMap::new();
     for level in levels {
-        channels.entry(level.channel).or_default().push(level.mean);
+        let mean = level.mean.clamp(-LEVEL_MAX, LEVEL_MAX);
+        channels.entry(level.channel).or_default().push(mean);
     }
     channels
 }
@@ -279,14 +290,25 @@ mod tests {
     }
 
     #[test]
+    fn dots_on_a_plain_surface_are_levels_like_others() {
+        let plain = [vec![0.0; 60], vec![1.0; 40]].concat();
+        let prior = library(std::slice::from_ref(&plain));
+        let alone = library(&[vec![0.0, 0.0, 0.0, 1.0, 1.0]]);
+        for value in [0.0, 0.5, 1.0] {
+            let ratio = prior.density(&reading(value)) / alone.density(&reading(value));
+            assert!((ratio - 1.0).abs() < 1e-6, "{value}: {ratio}");
+        }
+    }
+
+    #[test]
     fn levels_far_from_all_others_take_their_part_and_no_more() {
-        let own = vec![-1.5, 2.0, 0.25, 1.0];
+        let own = [-1.5, 2.0, 0.25, 1.0].repeat(3);
         let alone = library(std::slice::from_ref(&own));
         for far in [1e4, -1e9, 1e30] {
-            // Another object, and one level in five of the same.
+            // Another object, and one level in thirteen of the same.
             let other = library(&[own.clone(), vec![far, -far, far]]);
             let same = library(&[[own.clone(), vec![far]].concat()]);
-            for (prior, part) in [(other, 0.5), (same, 0.8)] {
+            for (prior, part) in [(other, 0.5), (same, 12.0 / 13.0)] {
                 for value in [-1.0, 0.0, 1.7] {
                     let ratio = prior.density(&reading(value)) / alone.density(&reading(value));
                     assert!((ratio - part).abs() < 1e-3, "{far} {value}: {ratio}");

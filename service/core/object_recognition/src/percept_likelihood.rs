@@ -4,7 +4,9 @@ use nalgebra::UnitQuaternion;
 use pulp::Arch;
 
 use crate::contact::{Contact, LevelReading};
-use crate::index::packed_places::{PackedPlace, PackedPlaces, packed_level, packed_level_variance};
+use crate::index::packed_places::{
+    PACKED_LEVEL_MAX, PackedPlace, PackedPlaces, packed_level, packed_level_variance,
+};
 use crate::indexed_model::IndexedModel;
 use crate::level_prior::LevelPrior;
 use crate::model::LevelMemory;
@@ -45,7 +47,7 @@ pub(crate) struct PerceptLikelihood<'a> {
 enum PerceptForm {
     /// No percept on a channel of the model.
     Nothing,
-    /// One level, less the mean of the model's.
+    /// One level, less the median of the model's.
     Level { value: f32, noise: f32, scale: f32 },
     /// Several percepts: each place's own lists are read.
     Several,
@@ -76,11 +78,12 @@ impl<'a> ContactPercepts<'a> {
             let level_prior = level_prior
                 .iter()
                 .find(|level_prior| level_prior.channel == reading.channel)?;
+            let scale = (1.0 - WRONG_PERCEPT_SHARE) / level_prior.density(anywhere);
             Some(Level {
                 channel: reading.channel,
                 value: reading.value,
                 noise: level_prior.noise(reading),
-                scale: (1.0 - WRONG_PERCEPT_SHARE) / level_prior.density(anywhere),
+                scale: scale.min(PACKED_LEVEL_MAX),
             })
         };
         Self {

@@ -56,12 +56,16 @@ pub(crate) const WRONG_PERCEPT_SHARE: f64 = 0.05;
 /// Scale of one less the cosine of two descriptors of one place: noise of a tenth costs 0.01 of it,
 /// half another view 0.3. Chosen.
 pub(crate) const DESCRIPTOR_SCALE: f64 = 0.05;
+/// Levels beyond are taken for as far, so that squares are numbers. Chosen.
+pub(crate) const LEVEL_MAX: f64 = 1e100;
 /// Least variance of levels, per one and the square of their mean: rounding. Chosen.
 pub(crate) const LEVEL_ROUNDING: f64 = 1e-12;
 /// Distance of a level from the median of its object beyond which it is no level of its kind, in
 /// median distances: no sensor resolves a thousandth of its range at most places and needs more
 /// than the whole at others. Chosen.
 pub(crate) const LEVEL_REACH: f64 = 1e3;
+/// Largest share of an object's levels that are no levels of its kind. Chosen.
+pub(crate) const UNUSUAL_SHARE_MAX: f64 = 0.1;
 /// Part of the variance of levels like it that is added to that of each reading, so that exact
 /// readings have a density. Chosen.
 pub(crate) const LEVEL_VARIANCE_FLOOR: f64 = 1e-6;

@@ -31,14 +31,25 @@ pub struct PlaceFilter {
     senses: Senses,
     search: Search,
     heading: HeadingSenses,
+    unusual: Vec<UnusualAt>,
 }
 
 state_of_struct!(PlaceFilter {
     window,
     senses,
     search,
-    heading
+    heading,
+    unusual
 });
+
+/// Where an unusual level of a channel counted last, by motion alone \[m\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct UnusualAt {
+    channel: u8,
+    at: Vector3<f64>,
+}
+
+state_of_struct!(UnusualAt { channel, at });
 
 impl PlaceFilter {
     /// Takes in a level; answers whether a node of the way is complete by it, about which the other
@@ -48,6 +59,19 @@ impl PlaceFilter {
         let step_m = self.step_m(field);
         self.window
             .add(level.channel, &level.in_odom, &at, level.value, step_m)
+    }
+
+    /// Takes in that a level is unusual; whether it is the first one of its channel since the last
+    /// node's step. Those sensed at rest are one.
+    pub fn take_unusual(&mut self, level: &SensedLevel, field: &dyn Field) -> bool {
+        let (channel, at) = (level.channel, level.in_odom.translation.vector);
+        let step_m = self.step_m(field);
+        match self.unusual.iter_mut().find(|last| last.channel == channel) {
+            Some(last) if (last.at - at).norm() < step_m => return false,
+            Some(last) => last.at = at,
+            None => self.unusual.push(UnusualAt { channel, at }),
+        }
+        true
     }
 
     /// Takes in a level beside a known heading \[rad\], where the agent is by motion alone \[m\].

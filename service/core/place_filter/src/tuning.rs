@@ -25,9 +25,10 @@ pub(crate) mod channel {
     /// Levels from which on a channel tells what is usual: some forty metres of way, since robots
     /// that have hardly moved know little of what there is.
     pub(crate) const USUAL_MIN: u64 = 256;
-    /// A level counts up to so many deviations in those of the channel, so that some sentinels in a
-    /// hundred widen them little, and a channel that changes is followed all the same.
-    pub(crate) const COUNTED_MAX: f64 = 3.0;
+    /// An unusual level counts as so many deviations off in those of the channel, so that some
+    /// sentinels in a hundred widen them little, and a channel that changes is followed all the
+    /// same.
+    pub(crate) const COUNTED_MAX: f64 = 2.0;
     /// Levels after which one is bounded before it counts.
     pub(crate) const LEVELS_MIN: u64 = 16;
     /// Levels over which mean and deviation of a channel are taken, about.

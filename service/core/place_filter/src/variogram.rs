@@ -40,26 +40,25 @@ impl Variogram {
         !is_known || (value - self.levels.mean()).abs() <= tuning::FAR * deviation
     }
 
-    /// Hears a level of an agent; whether it is usual. One that is not counts without its place, if
-    /// it is not one agent's word against that of others.
-    pub fn hear(&mut self, value: f64, agent: u32) -> bool {
-        let is_usual = self.is_usual(value);
-        if self.teachers.hear(agent, is_usual) && !is_usual {
-            self.count(value);
+    /// Hears that an agent sensed a usual level, which others contest no longer.
+    pub fn hear_usual(&mut self, agent: u32) {
+        self.teachers.hear(agent, true);
+    }
+
+    /// Takes in an unusual level of an agent, without its place, if it is not one agent's word
+    /// against that of others.
+    pub fn learn_unusual(&mut self, value: f64, agent: u32) {
+        if !self.teachers.hear(agent, false) {
+            return;
         }
-        is_usual
+        let most = tuning::COUNTED_MAX * self.levels.sd();
+        let apart = (value - self.levels.mean()).max(-most).min(most);
+        self.count(self.levels.mean() + apart);
     }
 
     fn count(&mut self, value: f64) {
-        let (mean, most) = (self.levels.mean(), tuning::COUNTED_MAX * self.levels.sd());
-        let is_known = self.levels.count() >= tuning::LEVELS_MIN && most > 0.0;
-        let counted = if is_known {
-            value.clamp(mean - most, mean + most)
-        } else {
-            value
-        };
         self.levels.fade(1.0 - 1.0 / tuning::LEVELS);
-        self.levels.add(counted, 1.0);
+        self.levels.add(value, 1.0);
         if self.levels.count().is_multiple_of(tuning::REFIT) {
             self.kernel = self.fit().filter(Kernel::tells);
         }
@@ -95,7 +94,7 @@ impl Variogram {
             self.lags_m[lag] += share * (distance_m - self.lags_m[lag]);
             self.halves[lag] += share * (0.5 * difference * difference - self.halves[lag]);
         }
-        self.count(value);
+        self.count(bounded(value, self.levels.mean()));
     }
 
     /// The model that fits best (weighted least squares after Cressie 1985):
@@ -200,10 +199,12 @@ mod tests {
             let at = 0.1 * f64::from(number);
             let noise = 0.05 * (f64::from(number) * 97.3).sin();
             let value = sensed(number, 5.0 + (1.3 * at).sin() + (0.9 * at).cos() + noise);
-            if !variogram.hear(value, agent) {
+            if !variogram.is_usual(value) {
+                variogram.learn_unusual(value, agent);
                 unusual += 1;
                 continue;
             }
+            variogram.hear_usual(agent);
             let earlier = way.iter().rev().take(12);
             variogram.learn(value, earlier.map(|(from, level)| (at - from, *level)));
             way.push((at, value));

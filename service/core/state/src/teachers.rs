@@ -37,6 +37,7 @@ impl Teachers {
         let is_doubted = self.doubted == Some(agent);
         if is_usual {
             if !is_doubted {
+                self.doubted = None;
                 self.uncontested = 0;
             }
             self.is_confirmed = false;
@@ -69,6 +70,7 @@ mod tests {
             assert!(teachers.hear(8, true));
         }
         // A second one confirms it, until anybody says otherwise.
+        assert!(!teachers.hear(7, false));
         assert!(teachers.hear(8, false) && teachers.hear(7, false) && teachers.hear(8, false));
         assert!(teachers.hear(9, true) && !teachers.hear(8, false));
     }

@@ -63,10 +63,6 @@ impl Fold<'_> {
         if self.head((channel, level.value()), &in_odom) {
             return self.go_on_seeking();
         }
-        let heard = (level.value(), number);
-        if !self.percepts.hear(channel, heard, self.revision) {
-            return self.go_on_seeking();
-        }
         let sensed = SensedLevel {
             channel,
             value: level.value(),
@@ -74,9 +70,19 @@ impl Fold<'_> {
             in_odom,
         };
         let mut filter = std::mem::take(&mut self.agent.filter);
+        if !self.percepts.is_usual(channel, sensed.value) {
+            if filter.take_unusual(&sensed, &self.levels_of(f64::INFINITY)) {
+                let unusual = Some(sensed.value);
+                self.percepts
+                    .learn_of(channel, number, unusual, self.revision);
+            }
+            self.agent.filter = filter;
+            return self.go_on_seeking();
+        }
         let is_complete = filter.take(&sensed, &self.levels_of(f64::INFINITY));
         if is_complete {
             for (channel, value, earlier) in filter.lessons() {
+                self.percepts.learn_of(channel, number, None, self.revision);
                 self.percepts
                     .learn_variogram(channel, value, earlier, self.revision);
             }

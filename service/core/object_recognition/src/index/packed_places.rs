@@ -23,7 +23,7 @@ pub(crate) struct PackedPlace {
     pub(crate) at: [f32; 3],
     /// Variance of a touch of this place, without the touch's noise, per axis \[m²\].
     pub(crate) variance_m2: f32,
-    /// Mean level, less the mean of the model's levels.
+    /// Mean level, less the median of the model's levels.
     pub(crate) level: f32,
     pub(crate) level_variance: f32,
 }
@@ -39,8 +39,9 @@ pub(crate) fn packed_level_variance(variance: f64) -> f32 {
     to_f32(variance.min(PACKED_LEVEL_MAX * PACKED_LEVEL_MAX))
 }
 
-/// Levels farther from a model's are taken for as far.
-const PACKED_LEVEL_MAX: f64 = 1e18;
+/// Levels farther from a model's are taken for as far, and a level that is rarer anywhere for as
+/// rare.
+pub(crate) const PACKED_LEVEL_MAX: f64 = 1e18;
 
 /// Places of a model in the order of the lattice index.
 #[derive(Clone, Debug)]
@@ -61,7 +62,7 @@ pub(crate) struct PackedPlaces {
     pub(crate) variance_m2: f64,
     /// Bound on the error of a distance by single precision \[m\].
     rounding_m: f64,
-    /// Channel and mean of the levels, if every place has one level of the same channel and no
+    /// Channel and median of the levels, if every place has one level of the same channel and no
     /// descriptor.
     levels: Option<(u16, f64)>,
     /// Nearest-place grids with their reaches \[m\], by scale.
@@ -144,7 +145,7 @@ impl PackedPlaces {
         }
     }
 
-    /// Channel and mean of the levels, if every place has one level of the same channel and no
+    /// Channel and median of the levels, if every place has one level of the same channel and no
     /// descriptor.
     pub(crate) fn levels(&self) -> Option<(u16, f64)> {
         self.levels
@@ -195,8 +196,8 @@ impl PackedPlaces {
     }
 }
 
-/// Channel and mean of the levels, if every place has one level of the same channel and no
-/// descriptor.
+/// Channel and median of the levels, if every place has one level of the same channel and no
+/// descriptor. One far from most leaves these their digits.
 fn levels(places: &[IndexedPlace]) -> Option<(u16, f64)> {
     let channel = places.first()?.levels.first()?.channel;
     let is_plain = |place: &IndexedPlace| {
@@ -208,6 +209,7 @@ fn levels(places: &[IndexedPlace]) -> Option<(u16, f64)> {
     if !places.iter().all(is_plain) {
         return None;
     }
-    let means = places.iter().map(|place| place.levels[0].mean);
-    Some((channel, means.sum::<f64>() / places.len() as f64))
+    let mut means: Vec<f64> = places.iter().map(|place| place.levels[0].mean).collect();
+    means.sort_unstable_by(f64::total_cmp);
+    Some((channel, means[means.len() / 2]))
 }

@@ -48,16 +48,18 @@ fn an_object_with_absurd_levels_leaves_the_others_as_they_were() {
 #[test]
 fn a_level_that_stands_for_nothing_leaves_the_other_levels_of_its_object() {
     let taught = taught(WAVES_APART, 0..4, 300);
-    let mut library = ObjectLibrary::default();
-    for id in (0..4).map(ObjectId) {
-        let mut model = taught.get(id).expect("four were taught").clone();
-        let mut contact = model.places()[0].contact();
-        contact.position_m.x += 0.01;
-        contact.levels[0].value = -99_999.0;
-        model.learn(&contact);
-        library.put(id, model);
+    for nothing in [-99_999.0, -2_147_483_648.0, 1e30] {
+        let mut library = ObjectLibrary::default();
+        for id in (0..4).map(ObjectId) {
+            let mut model = taught.get(id).expect("four were taught").clone();
+            let mut contact = model.places()[0].contact();
+            contact.position_m.x += 0.01;
+            contact.levels[0].value = nothing;
+            model.learn(&contact);
+            library.put(id, model);
+        }
+        assert_eq!(verdicts(&library, 40), all_named(), "{nothing}");
     }
-    assert_eq!(verdicts(&library, 40), all_named());
 }
 
 #[test]

@@ -53,11 +53,13 @@ impl ChannelModel {
     /// others of its class, as after a jump of the odometry, counts as less, and not at all if it
     /// is one agent's word against that of others.
     pub(crate) fn learn(&mut self, angle_rad: f64, distance_m: f64, agent: u32) {
+        let pairs: u64 = self.distances_m.iter().map(Moments::count).sum();
         let Some(class) = self.distances_m.get_mut(class_of(angle_rad)) else {
             return;
         };
         let deviation_m = class.sd();
-        let is_known = class.count() >= tuning::FAR_PAIRS_MIN && deviation_m > 0.0;
+        let (all_min, own_min) = tuning::FAR_PAIRS_MIN;
+        let is_known = pairs >= all_min && class.count() >= own_min && deviation_m > 0.0;
         let most_m = |deviations: f64| class.mean() + deviations * deviation_m;
         let is_usual = !is_known || distance_m <= most_m(tuning::FAR);
         if !self.teachers.hear(agent, is_usual) {
@@ -79,11 +81,11 @@ impl ChannelModel {
 
     /// The same of all classes, from the least similar on.
     ///
-    /// Of views that are similar the more similar ones are nearer: a class that is much farther
-    /// than those of less similar views was taught by a sensor that shows the same everywhere.
+    /// Of views that are similar the more similar ones are nearer: a class that is farther than all
+    /// of less similar views was taught by a sensor that shows the same everywhere.
     fn all_known(&self) -> impl Iterator<Item = (usize, Option<(f64, f64)>)> {
         let limit = self.similar_rad().map_or(0, class_of);
-        let (mut count, mut sum_m) = (0.0, 0.0);
+        let (mut count, mut farthest_m) = (0, 0.0_f64);
         let classes = self.distances_m.iter().enumerate().rev();
         classes.map(move |(class, own)| {
             if own.count() < tuning::PAIRS_MIN {
@@ -95,11 +97,11 @@ impl ChannelModel {
             let most_m = if count < tuning::ABOVE_MIN {
                 f64::INFINITY
             } else {
-                tuning::FARTHER_MAX * sum_m / count
+                farthest_m
             };
             let mean_m = own.mean().min(most_m);
-            count += 1.0;
-            sum_m += mean_m;
+            count += 1;
+            farthest_m = farthest_m.max(mean_m);
             (class, Some((mean_m, own.sd().min(most_m))))
         })
     }

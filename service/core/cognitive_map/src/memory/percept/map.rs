@@ -110,10 +110,27 @@ impl PerceptMap {
         }
     }
 
-    /// A channel hears a level of an agent; whether it is like those of the channel.
-    pub(crate) fn hear(&mut self, channel: u8, (value, agent): (f64, u32), revision: u64) -> bool {
-        let channel = self.channels.get_mut(usize::from(channel), revision);
-        channel.is_none_or(|channel| channel.variogram.hear(value, agent))
+    /// Whether a level is like those of its channel.
+    pub(crate) fn is_usual(&self, channel: u8, value: f64) -> bool {
+        let channel = self.channels.get(usize::from(channel));
+        channel.is_none_or(|channel| channel.variogram.is_usual(value))
+    }
+
+    /// A channel learns that an agent sensed a usual level, or an unusual one.
+    pub(crate) fn learn_of(
+        &mut self,
+        channel: u8,
+        agent: u32,
+        unusual: Option<f64>,
+        revision: u64,
+    ) {
+        let Some(channel) = self.channels.get_mut(usize::from(channel), revision) else {
+            return;
+        };
+        match unusual {
+            None => channel.variogram.hear_usual(agent),
+            Some(value) => channel.variogram.learn_unusual(value, agent),
+        }
     }
 
     /// A channel learns whether its levels tell the heading.
