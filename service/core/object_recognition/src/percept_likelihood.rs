@@ -5,7 +5,7 @@ use pulp::Arch;
 
 use crate::contact::{Contact, LevelReading};
 use crate::index::packed_places::{
-    PACKED_LEVEL_MAX, PackedPlace, PackedPlaces, packed_level, packed_level_variance,
+    PACKED_LEVEL_MAX, PackedPlace, PackedPlaces, packed_level_variance, packed_reading,
 };
 use crate::indexed_model::IndexedModel;
 use crate::level_prior::LevelPrior;
@@ -105,7 +105,7 @@ impl<'a> ContactPercepts<'a> {
             Some((channel, middle)) => { levels.iter() }
                 .find(|level| level.channel == channel)
                 .map_or(PerceptForm::Nothing, |level| PerceptForm::Level {
-                    value: packed_level(level.value - middle),
+                    value: packed_reading(level.value - middle),
                     noise: packed_level_variance(level.noise),
                     scale: to_f32(level.scale),
                 }),

@@ -164,9 +164,8 @@ pub(super) const NOISE_SHARE_DIM_MAX: usize = 192;
 
 /// Shortest distance at which a direction means something \[m\].
 pub(super) const DIRECTION_DISTANCE_MIN_M: f64 = 0.02;
-/// Deviation that is added to each component of a sighting \[m, rad\]: none is exact, whatever is
-/// stated, and no sensor of a robot is surer. As for the refined past.
-pub(super) const SIGHTING_SD_MIN: f64 = 1e-3;
+/// Least deviation of a component of a sighting \[m, rad\], so that none is without error.
+pub(super) const SIGHTING_SD_MIN: f64 = 1e-6;
 /// How long a sighting of an agent waits for that agent's motion, by the observer's clock \[ns\].
 pub(super) const PENDING_NS_MAX: i64 = 2_000_000_000;
 /// How long an error of distance lasts \[s\]: until the robot sees its target from another side.

@@ -34,6 +34,12 @@ pub(crate) fn packed_level(level: f64) -> f32 {
     to_f32(level.clamp(-PACKED_LEVEL_MAX, PACKED_LEVEL_MAX))
 }
 
+/// The same of a contact. One beyond all levels of places agrees with none.
+pub(crate) fn packed_reading(level: f64) -> f32 {
+    let most = 2.0 * PACKED_LEVEL_MAX;
+    to_f32(level.clamp(-most, most))
+}
+
 /// A variance of such levels.
 pub(crate) fn packed_level_variance(variance: f64) -> f32 {
     to_f32(variance.min(PACKED_LEVEL_MAX * PACKED_LEVEL_MAX))
