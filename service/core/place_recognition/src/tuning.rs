@@ -13,16 +13,6 @@ pub(crate) mod channel {
     pub(crate) const CLASSES: usize = 32;
     /// Fewest pairs of views for a class to be used.
     pub(crate) const PAIRS_MIN: u64 = 8;
-    /// A distance is a usual one up to so many deviations above the mean of its class: as for
-    /// levels.
-    pub(crate) const FAR: f64 = 6.0;
-    /// One that is not counts as of so many.
-    pub(crate) const COUNTED_MAX: f64 = 3.0;
-    /// Pairs of all classes, and of its own, from which on a distance may be unusual: before,
-    /// robots have seen too little.
-    pub(crate) const FAR_PAIRS_MIN: (u64, u64) = (1000, 16);
-    /// Classes of less similar views from which on they bound one.
-    pub(crate) const ABOVE_MIN: usize = 3;
     /// Pairs over which the mean of a class fades.
     pub(crate) const PAIRS: f64 = 1000.0;
     /// Pairs over which the mean of unrelated views fades.

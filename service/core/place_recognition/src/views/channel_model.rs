@@ -3,9 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::tuning::channel as tuning;
-use state::{
-    Codec, CorruptState, Moments, State, StateReader, StateWriter, Teachers, state_of_struct,
-};
+use state::{Codec, CorruptState, Moments, State, StateReader, StateWriter, state_of_struct};
 
 /// Kernel of a channel: the expected cosine of two views at a distance d is c exp(−d² / 2ℓ²).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +25,6 @@ pub(crate) struct ChannelModel {
     distances_m: [Moments; tuning::CLASSES],
     /// Angles between unrelated views \[rad\].
     unrelated: Moments,
-    teachers: Teachers,
 }
 
 /// A distance with its standard deviation \[m\].
@@ -45,65 +42,15 @@ impl ChannelModel {
             dimension,
             distances_m: [Moments::default(); tuning::CLASSES],
             unrelated: Moments::default(),
-            teachers: Teachers::default(),
         }
     }
 
-    /// Learns from two views of an agent whose distance is known from its motion. One far off the
-    /// others of its class, as after a jump of the odometry, counts as less, and not at all if it
-    /// is one agent's word against that of others.
-    pub(crate) fn learn(&mut self, angle_rad: f64, distance_m: f64, agent: u32) {
-        let pairs: u64 = self.distances_m.iter().map(Moments::count).sum();
-        let Some(class) = self.distances_m.get_mut(class_of(angle_rad)) else {
-            return;
-        };
-        let deviation_m = class.sd();
-        let (all_min, own_min) = tuning::FAR_PAIRS_MIN;
-        let is_known = pairs >= all_min && class.count() >= own_min && deviation_m > 0.0;
-        let most_m = |deviations: f64| class.mean() + deviations * deviation_m;
-        let is_usual = !is_known || distance_m <= most_m(tuning::FAR);
-        if !self.teachers.hear(agent, is_usual) {
-            return;
+    /// Learns from two views whose distance is known from motion.
+    pub(crate) fn learn(&mut self, angle_rad: f64, distance_m: f64) {
+        if let Some(class) = self.distances_m.get_mut(class_of(angle_rad)) {
+            class.fade(1.0 - 1.0 / tuning::PAIRS);
+            class.add(distance_m, 1.0);
         }
-        let counted_m = if is_usual {
-            distance_m
-        } else {
-            most_m(tuning::COUNTED_MAX)
-        };
-        class.fade(1.0 - 1.0 / tuning::PAIRS);
-        class.add(counted_m, 1.0);
-    }
-
-    /// Mean distance of the pairs of a class and its deviation \[m\], once there are enough.
-    fn known(&self, class: usize) -> Option<(f64, f64)> {
-        self.all_known().find(|known| known.0 == class)?.1
-    }
-
-    /// The same of all classes, from the least similar on.
-    ///
-    /// Of views that are similar the more similar ones are nearer: a class that is farther than all
-    /// of less similar views was taught by a sensor that shows the same everywhere.
-    fn all_known(&self) -> impl Iterator<Item = (usize, Option<(f64, f64)>)> {
-        let limit = self.similar_rad().map_or(0, class_of);
-        let (mut count, mut farthest_m) = (0, 0.0_f64);
-        let classes = self.distances_m.iter().enumerate().rev();
-        classes.map(move |(class, own)| {
-            if own.count() < tuning::PAIRS_MIN {
-                return (class, None);
-            }
-            if class > limit {
-                return (class, Some((own.mean(), own.sd())));
-            }
-            let most_m = if count < tuning::ABOVE_MIN {
-                f64::INFINITY
-            } else {
-                farthest_m
-            };
-            let mean_m = own.mean().min(most_m);
-            count += 1;
-            farthest_m = farthest_m.max(mean_m);
-            (class, Some((mean_m, own.sd().min(most_m))))
-        })
     }
 
     /// Learns from two views that are far from one another along the way, which stand for so many
@@ -138,13 +85,13 @@ impl ChannelModel {
         }
         // Least squares of ln cos = ln c − d² / 2ℓ², over the classes that say something.
         let (mut weights, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for (class, known) in self.all_known() {
+        for (class, known) in self.distances_m.iter().enumerate() {
             let cosine = ((class as f64 + 0.5) * tuning::WIDTH_RAD).cos();
-            let Some((mean_m, _)) = known.filter(|_| cosine >= tuning::KERNEL_COSINE_MIN) else {
+            if known.count() < tuning::PAIRS_MIN || cosine < tuning::KERNEL_COSINE_MIN {
                 continue;
-            };
-            let squared = mean_m * mean_m;
-            let weight = self.distances_m[class].weight() * cosine * cosine;
+            }
+            let squared = known.mean().powi(2);
+            let weight = known.weight() * cosine * cosine;
             weights += weight;
             x += weight * squared;
             y += weight * cosine.ln();
@@ -168,10 +115,19 @@ impl ChannelModel {
     /// Reach: distance beyond which views are no more similar than unrelated ones \[m\], once that
     /// is known.
     pub(crate) fn reach_m(&self) -> Option<f64> {
-        let limit = class_of(self.similar_rad()?);
-        let known = self.all_known().filter(|known| known.0 <= limit);
-        known
-            .filter_map(|(_, known)| Some(known?.0))
+        let unrelated = &self.unrelated;
+        if unrelated.count() < tuning::UNRELATED_MIN {
+            return None;
+        }
+        let limit = class_of(unrelated.mean() - tuning::SIMILAR_SD * unrelated.sd())
+            .min(tuning::CLASSES - 1);
+        let known = (0..=limit)
+            .rev()
+            .filter_map(|class| self.distances_m.get(class));
+        let farthest = known
+            .filter(|class| class.count() >= tuning::PAIRS_MIN)
+            .map(Moments::mean);
+        farthest
             .max_by(f64::total_cmp)
             .filter(|reach_m| *reach_m > 0.0)
     }
@@ -198,7 +154,10 @@ impl ChannelModel {
         if angle_rad > self.similar_rad()? {
             return None;
         }
-        let known = |class: usize| self.known(class);
+        let known = |class: usize| {
+            let class = self.distances_m.get(class)?;
+            (class.count() >= tuning::PAIRS_MIN).then(|| (class.mean(), class.sd()))
+        };
         let class = class_of(angle_rad);
         let Some(own) = known(class) else {
             // Nearer than all pairs so far: the distance is interpolated down to zero.
@@ -269,7 +228,6 @@ state_of_struct!(ChannelModel {
     dimension,
     distances_m,
     unrelated,
-    teachers,
 });
 
 #[cfg(test)]
@@ -281,7 +239,7 @@ mod tests {
         let mut model = ChannelModel::new("view".into(), 64);
         for step in 0..4000_u32 {
             let distance_m = f64::from(step % 100) * 0.015;
-            model.learn(distance_m, distance_m, step % 2);
+            model.learn(distance_m, distance_m);
             model.learn_unrelated(1.5 + 0.1 * (f64::from(step) * 0.7).sin(), 1);
         }
         model
@@ -315,37 +273,10 @@ mod tests {
     }
 
     #[test]
-    fn a_stuck_camera_and_wrong_odometry_leave_the_distances() {
-        let honest = learned();
-        let reach_m = honest.reach_m().unwrap();
-        let (mut stuck, mut scaled) = (honest.clone(), honest.clone());
-        for step in 0..300_u32 {
-            // A camera that shows the same all the way, and odometry in millimetres.
-            stuck.learn(0.0, 0.3 * f64::from(step), 7);
-            let distance_m = f64::from(step % 100) * 0.015;
-            scaled.learn(distance_m, 1000.0 * distance_m, 7);
-        }
-        let stuck_m = stuck.reach_m().unwrap();
-        assert!(
-            (stuck_m / reach_m - 1.0).abs() < 0.05,
-            "{stuck_m} {reach_m}"
-        );
-        let scaled_m = scaled.reach_m().unwrap();
-        assert!(
-            (scaled_m / reach_m - 1.0).abs() < 0.05,
-            "{scaled_m} {reach_m}"
-        );
-        for angle_rad in [0.33, 0.5, 0.77, 1.0] {
-            let found = stuck.distance(angle_rad).unwrap();
-            assert!((found.mean_m - angle_rad).abs() < 0.02, "{found:?}");
-        }
-    }
-
-    #[test]
     fn there_is_no_distance_before_unrelated_views_are_known() {
         let mut model = ChannelModel::new("view".into(), 64);
         for _ in 0..100 {
-            model.learn(0.2, 0.2, 0);
+            model.learn(0.2, 0.2);
         }
         assert_eq!(model.distance(0.2), None);
     }
