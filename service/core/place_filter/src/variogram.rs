@@ -40,7 +40,7 @@ impl Variogram {
         !is_known || (value - self.levels.mean()).abs() <= tuning::FAR * deviation
     }
 
-    /// Hears that an agent sensed a usual level, which others contest no longer.
+    /// An agent sensed a usual level: it contests the unusual ones of another.
     pub fn hear_usual(&mut self, agent: u32) {
         self.teachers.hear(agent, true);
     }
