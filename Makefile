@@ -20,6 +20,11 @@ BROWSER := tests/browser
 export CHROMIUM ?= chromium
 AS_ROOT := $(shell [ $$(id -u) = 0 ] || echo sudo --non-interactive)
 
+# A clean clone is built once: what would make a second build faster only fills its disk.
+ifdef CI
+export CARGO_INCREMENTAL := 0
+endif
+
 # The end-to-end tests of both languages start this binary.
 export COGMAP_BIN := $(TARGET)/debug/cogmap
 

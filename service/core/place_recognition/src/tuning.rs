@@ -15,6 +15,10 @@ pub(crate) mod channel {
     pub(crate) const PAIRS_MIN: u64 = 8;
     /// Pairs over which the mean of a class fades.
     pub(crate) const PAIRS: f64 = 1000.0;
+    /// Fewest pairs of a class before a distance may be far for it: so many times what lies three
+    /// standard deviations beyond the mean.
+    pub(crate) const USUAL_MIN: u64 = 64;
+    pub(crate) const FAR: f64 = 2.0;
     /// Pairs over which the mean of unrelated views fades.
     pub(crate) const UNRELATED: f64 = 4096.0;
     /// Fewest unrelated pairs before views are compared with chance.

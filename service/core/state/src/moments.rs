@@ -1,6 +1,6 @@
 //! Weighted mean and deviation, one value at a time.
 
-use crate::state_of_struct;
+use crate::{CorruptState, State, StateReader, StateWriter};
 
 /// Weighted mean and sum of squared deviations of values that came one by one (Welford 1962, with
 /// weights after West 1979). No large sums are subtracted, so nothing cancels out.
@@ -18,12 +18,27 @@ pub struct Moments {
     squares: f64,
 }
 
-state_of_struct!(Moments {
-    count,
-    weight,
-    mean,
-    squares
-});
+impl State for Moments {
+    fn write(&self, out: &mut StateWriter) {
+        self.count.write(out);
+        [self.weight, self.mean, self.squares].write(out);
+    }
+
+    fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
+        let count = State::read(input)?;
+        let [weight, mean, squares] = State::read(input)?;
+        let is_sound = f64::is_finite(mean) && f64::is_finite(squares);
+        if !is_sound || !(0.0..f64::INFINITY).contains(&weight) {
+            return Err(CorruptState::Invalid);
+        }
+        Ok(Self {
+            count,
+            weight,
+            mean,
+            squares,
+        })
+    }
+}
 
 impl Moments {
     /// Adds a value with a weight above zero.
@@ -109,6 +124,38 @@ mod tests {
                 prop_assert!((moments.mean() - mean).abs() < grain);
                 prop_assert!((moments.sd() - sd).abs() < grain.max(1e-9));
             }
+        }
+    }
+
+    #[test]
+    fn what_is_no_moment_is_not_read() {
+        let written = |moments: Moments| {
+            let mut out = StateWriter::default();
+            moments.write(&mut out);
+            out.into_bytes()
+        };
+        let sound = moments(&[(3.0, 0.5), (-1e9, 1.0)]);
+        let read = |bytes: &[u8]| Moments::read(&mut StateReader::new(bytes));
+        assert_eq!(read(&written(sound)).unwrap(), sound);
+        for broken in [
+            Moments {
+                weight: -0.5,
+                ..sound
+            },
+            Moments {
+                weight: f64::INFINITY,
+                ..sound
+            },
+            Moments {
+                mean: f64::NEG_INFINITY,
+                ..sound
+            },
+            Moments {
+                squares: f64::NAN,
+                ..sound
+            },
+        ] {
+            assert!(read(&written(broken)).is_err(), "{broken:?}");
         }
     }
 

@@ -93,12 +93,17 @@ impl Walker {
     }
 
     fn go(&mut self, map: &mut CognitiveMap, turn_rad: f64) {
+        self.go_in(map, turn_rad, 1.0);
+    }
+
+    /// Goes a step with odometry in so many metres.
+    fn go_in(&mut self, map: &mut CognitiveMap, turn_rad: f64, unit: f64) {
         let went = Isometry3::new(Vector3::x() * STEP_M, Vector3::z() * turn_rad);
         self.truth *= went;
         let (sd_m, sd_rad) = (0.001, 0.001);
         let read_m = [
-            STEP_M + sd_m * self.random.normal(),
-            sd_m * self.random.normal(),
+            unit * (STEP_M + sd_m * self.random.normal()),
+            unit * sd_m * self.random.normal(),
             0.0,
         ];
         let read_rad = turn_rad + sd_rad * self.random.normal();
@@ -108,20 +113,25 @@ impl Walker {
         self.robot.sample(map, SampleBody::Motion(motion));
     }
 
-    /// Goes so many steps within the room, back towards its middle where it comes too near to a
-    /// wall; answers how it called itself.
+    /// The turn of the next step within the room: back towards its middle where it comes too near
+    /// to a wall.
+    fn roaming_rad(&mut self) -> f64 {
+        let middle = Vector3::new(EDGE_M / 2.0, EDGE_M / 2.0, 0.0);
+        let to_middle = self
+            .truth
+            .inverse_transform_vector(&(middle - self.truth.translation.vector));
+        if to_middle.norm() > 0.3 * EDGE_M {
+            to_middle.y.atan2(to_middle.x).clamp(-0.3, 0.3)
+        } else {
+            0.1 * self.random.normal()
+        }
+    }
+
+    /// Goes so many steps within the room; answers how it called itself.
     fn roam(&mut self, map: &mut CognitiveMap, room: &Room, steps: u32) -> Vec<Status> {
         let mut called = Vec::new();
         for _ in 0..steps {
-            let middle = Vector3::new(EDGE_M / 2.0, EDGE_M / 2.0, 0.0);
-            let to_middle = self
-                .truth
-                .inverse_transform_vector(&(middle - self.truth.translation.vector));
-            let turn_rad = if to_middle.norm() > 0.3 * EDGE_M {
-                to_middle.y.atan2(to_middle.x).clamp(-0.3, 0.3)
-            } else {
-                0.1 * self.random.normal()
-            };
+            let turn_rad = self.roaming_rad();
             self.step(map, room, turn_rad);
             called.push(map.status(self.robot.id).unwrap());
         }
@@ -264,4 +274,36 @@ fn a_map_restored_in_doubt_goes_on_like_the_original() {
         was_lost |= called.contains(&Status::Lost);
     }
     assert!(was_lost);
+}
+
+/// Who wakes up is found in a room that a robot with a stuck camera, or with odometry in
+/// millimetres, was in too.
+#[test]
+fn a_faulty_robot_hides_the_room_from_no_other() {
+    let (map, room) = explored();
+    for (unit, is_stuck) in [(1.0, true), (1000.0, false)] {
+        let mut map = map.clone();
+        let mut faulty = Walker::told(&mut map, [4.0, 3.0], 0.4, 3);
+        let mut view = room.view(&faulty.truth.translation.vector, &mut faulty.random);
+        for _ in 0..1000 {
+            let turn_rad = faulty.roaming_rad();
+            faulty.go_in(&mut map, turn_rad, unit);
+            if !is_stuck {
+                view = room.view(&faulty.truth.translation.vector, &mut faulty.random);
+            }
+            faulty.robot.sample(&mut map, descriptor("camera", &view));
+        }
+        for (seed, at) in [(5, [6.5, 6.0]), (6, [1.5, 6.5]), (7, [6.0, 2.5])] {
+            let mut newcomer = Walker {
+                robot: Robot::enrol(&mut map),
+                truth: Isometry3::identity(),
+                random: Seeded(seed),
+            };
+            newcomer.carry(at, 0.9 * at[1]);
+            let called = newcomer.roam(&mut map, &room, 60);
+            assert_eq!(called.last(), Some(&Status::Localized), "{unit} {seed}");
+            let off_m = newcomer.off_m(&map);
+            assert!(off_m < 0.25, "{unit} {seed}: {off_m}");
+        }
+    }
 }

@@ -69,7 +69,7 @@ impl ViewMemory {
             let angle_rad = angle_rad(&recent.vector, vector);
             let way = recent.in_odom.inv_mul(&view.in_odom);
             let distance_m = way.translation.vector.norm();
-            model.learn(angle_rad, distance_m);
+            model.learn(view.sample.agent, angle_rad, distance_m);
             if index + 1 == track.recent.len() {
                 is_news = angle_rad > model.news_rad() && is_beyond(&way, tuning::STEP);
             }

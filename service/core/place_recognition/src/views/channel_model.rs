@@ -3,7 +3,9 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::tuning::channel as tuning;
-use state::{Codec, CorruptState, Moments, State, StateReader, StateWriter, state_of_struct};
+use state::{
+    Codec, CorruptState, Moments, State, StateReader, StateWriter, Teachers, state_of_struct,
+};
 
 /// Kernel of a channel: the expected cosine of two views at a distance d is c exp(−d² / 2ℓ²).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +27,8 @@ pub(crate) struct ChannelModel {
     distances_m: [Moments; tuning::CLASSES],
     /// Angles between unrelated views \[rad\].
     unrelated: Moments,
+    /// Who teaches the distances.
+    teachers: Teachers,
 }
 
 /// A distance with its standard deviation \[m\].
@@ -42,15 +46,33 @@ impl ChannelModel {
             dimension,
             distances_m: [Moments::default(); tuning::CLASSES],
             unrelated: Moments::default(),
+            teachers: Teachers::default(),
         }
     }
 
-    /// Learns from two views whose distance is known from motion.
-    pub(crate) fn learn(&mut self, angle_rad: f64, distance_m: f64) {
-        if let Some(class) = self.distances_m.get_mut(class_of(angle_rad)) {
+    /// Learns from two views of an agent whose distance is known from its motion. One that is much
+    /// farther than views so alike are does not count if it is one agent's word against that of
+    /// others: its odometry may be in another unit, or its sensor stuck.
+    pub(crate) fn learn(&mut self, agent: u32, angle_rad: f64, distance_m: f64) {
+        let number = class_of(angle_rad);
+        let is_usual = !self.is_far(number, distance_m);
+        let Some(class) = self.distances_m.get_mut(number) else {
+            return;
+        };
+        if self.teachers.hear(agent, is_usual) {
             class.fade(1.0 - 1.0 / tuning::PAIRS);
             class.add(distance_m, 1.0);
         }
+    }
+
+    /// Whether views as alike as those of a class, or less, are known to be much nearer.
+    fn is_far(&self, class: usize, distance_m: f64) -> bool {
+        let known = self.distances_m.iter().skip(class);
+        let mut known = known.filter(|class| class.count() >= tuning::USUAL_MIN);
+        known.any(|class| {
+            let sd_m = class.sd().max(tuning::SD_M_MIN);
+            distance_m > tuning::FAR * (class.mean() + 3.0 * sd_m)
+        })
     }
 
     /// Learns from two views that are far from one another along the way, which stand for so many
@@ -228,6 +250,7 @@ state_of_struct!(ChannelModel {
     dimension,
     distances_m,
     unrelated,
+    teachers,
 });
 
 #[cfg(test)]
@@ -239,7 +262,7 @@ mod tests {
         let mut model = ChannelModel::new("view".into(), 64);
         for step in 0..4000_u32 {
             let distance_m = f64::from(step % 100) * 0.015;
-            model.learn(distance_m, distance_m);
+            model.learn(0, distance_m, distance_m);
             model.learn_unrelated(1.5 + 0.1 * (f64::from(step) * 0.7).sin(), 1);
         }
         model
@@ -276,7 +299,7 @@ mod tests {
     fn there_is_no_distance_before_unrelated_views_are_known() {
         let mut model = ChannelModel::new("view".into(), 64);
         for _ in 0..100 {
-            model.learn(0.2, 0.2);
+            model.learn(0, 0.2, 0.2);
         }
         assert_eq!(model.distance(0.2), None);
     }

@@ -28,7 +28,7 @@ fn memory(count: u32, draws: &mut Seeded) -> ViewMemory {
         let channel = memory.channel_of(&seen).unwrap();
         for step in 0..4000_u32 {
             let apart = f64::from(step % 100) * 0.015;
-            memory.channels[usize::from(channel)].learn(apart, apart);
+            memory.channels[usize::from(channel)].learn(0, apart, apart);
         }
     }
     for ordinal in 0..count {
