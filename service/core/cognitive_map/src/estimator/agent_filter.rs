@@ -340,8 +340,15 @@ impl AgentFilter {
         self.calibration = Calibration::of_components(&bounded);
     }
 
-    /// A landmark was seen: how does that fit with its last sightings and odometry?
-    pub(super) fn learn_noise(&mut self, label: &Label, stamp_ns: i64, relation: &Relation) {
+    /// A landmark was seen: how does that fit with its last sightings and odometry, if that is not
+    /// doubted?
+    pub(super) fn learn_noise(
+        &mut self,
+        label: &Label,
+        stamp_ns: i64,
+        relation: &Relation,
+        is_doubted: bool,
+    ) {
         let lasting = SVector::<f64, CALIBRATION>::from_fn(|k, _| {
             let is_out_of_plane = self.is_planar && (k == 2 || k == 3);
             if is_out_of_plane {
@@ -350,7 +357,8 @@ impl AgentFilter {
                 self.at_run_start[(POSE + k, POSE + k)]
             }
         });
-        self.noise.note(label, stamp_ns, relation, &lasting);
+        self.noise
+            .note(label, stamp_ns, relation, &lasting, is_doubted);
     }
 
     /// Whether the position is out of bounds or of unbounded variance, so that the pose says

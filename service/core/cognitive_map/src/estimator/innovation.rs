@@ -160,8 +160,7 @@ pub(super) fn pose_innovation(
     let residual = se3::twist(&expected.inv_mul(seen.pose()));
     let by_observer = -se3::adjoint(&expected.inverse());
     let sd = seen.noise().sd();
-    let floor = SVector::<f64, 6>::repeat(SIGHTING_SD_MIN);
-    let mut variance = sd.component_mul(sd) + floor.component_mul(&floor);
+    let mut variance = sd.map(|sd| sd.max(SIGHTING_SD_MIN).powi(2));
     for k in 3..6 {
         variance[k] = on_the_circle(variance[k]);
     }
@@ -170,5 +169,5 @@ pub(super) fn pose_innovation(
 
 /// Squares, never quite zero.
 fn variances(sd: &Vector3<f64>) -> Vector3<f64> {
-    sd.map(|sd| sd * sd + SIGHTING_SD_MIN * SIGHTING_SD_MIN)
+    sd.map(|sd| sd.max(SIGHTING_SD_MIN).powi(2))
 }

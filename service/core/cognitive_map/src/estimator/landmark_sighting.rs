@@ -37,9 +37,12 @@ impl Estimator {
             frame.begin_veer(observer, &self.parameters);
         }
         let state = frame.members[observer].state_mut();
-        if !state.is_doubted() && !matches!(relation, Relation::Range(_)) {
-            state.filter.learn_noise(called, stamp_ns, relation);
-            frame.take_back_noise(observer, stamp_ns);
+        if !matches!(relation, Relation::Range(_)) {
+            let is_doubted = state.is_doubted();
+            { &mut state.filter }.learn_noise(called, stamp_ns, relation, is_doubted);
+            if !is_doubted {
+                frame.take_back_noise(observer, stamp_ns);
+            }
         }
         let measurement = Measurement {
             observer,

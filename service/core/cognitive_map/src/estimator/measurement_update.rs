@@ -55,6 +55,7 @@ impl Frame {
             .to_rotation_matrix()
             .into_inner()
             .transpose();
+        let innovation = self.as_sensed(measurement, innovation);
         let blocks = [
             past.block(&(innovation.by_point * seen_by_pose(&expected))),
             point_block(landmark.offset, &(innovation.by_point * to_body)),
@@ -88,6 +89,12 @@ impl Frame {
         outcome
     }
 
+    /// A sighting with the variances that the observer's sensor turns out to have at least.
+    fn as_sensed(&self, measurement: &Measurement<'_>, seen: PointInnovation) -> PointInnovation {
+        let observer = &self.members[measurement.observer];
+        observer.filter().noise.as_sensed(seen)
+    }
+
     /// Another member was seen, which has moved by `back` since.
     pub(super) fn update_by_member(
         &mut self,
@@ -107,6 +114,7 @@ impl Frame {
             let Some(innovation) = PointInnovation::new(measurement.relation, &expected) else {
                 return Outcome::nothing();
             };
+            let innovation = self.as_sensed(measurement, innovation);
             let relative = past.pose.rotation.inverse() * other.pose.rotation;
             let turn = relative.to_rotation_matrix().into_inner();
             let by_target = beside(&(innovation.by_point * turn), &Matrix3::zeros());
@@ -137,6 +145,7 @@ impl Frame {
         };
         let mut variance = Vector6::zeros();
         let noise = PointInnovation::new(measurement.relation, &point).and_then(|innovation| {
+            let innovation = self.as_sensed(measurement, innovation);
             let sensor = &member.state.sensor;
             let components = sensor.variance(&innovation, None, measurement.parameters);
             variance.fixed_rows_mut::<3>(0).copy_from(&components);

@@ -25,16 +25,28 @@
 //!   was too large by is taken back then ([`NoiseTrial`]).
 //! - **Stated noise** counts at least. Beside it counts as much of the assumed noise as is certain
 //!   to be there, so that a robot that states too little does not bend the map.
+//!
+//! A sensor that states far too little contradicts the map, and so is never taken in and judged
+//! there; but its sightings contradict one another, too. Its factor f follows the median of two in
+//! succession, by steps of ln f, with odometry as noisy as it is assumed to be:
+//!
+//! ```text
+//! ln f ← ln f ± η      + where ν² > ½ (Σ_{i ≤ 2} q_i + r + f Σ_{i > 2} q_i)      ln f ≥ 0
+//! ```
+//!
+//! What it states counts for f/4 at least: half of a deviation is left to the map.
 
 use nalgebra::{Isometry3, Matrix4, Matrix6, Vector4, Vector6};
 
 use super::calibration::LastingErrors;
-use super::sighting_pair::{Anchor, NoisyMotion, Residual};
+use super::innovation::PointInnovation;
+use super::sighting_pair::{Anchor, NoisyMotion, Residual, sensor_part};
 use super::tuning::{
-    NOISE_ANGLE_SD_MAX_RAD, NOISE_CAUTION, NOISE_LOG_SCALE_MAX, NOISE_LOG_STEP_MAX, NOISE_MEMORY,
-    NOISE_PAIR_NS_MAX, NOISE_PAIR_WEIGHT, NOISE_PAIRS_MAX, NOISE_PRIOR_SD, NOISE_ROBUST,
-    NOISE_SATURATED, NOISE_SHARE_MIN, NOISE_SUM_LENGTH_MAX_M, NOISE_SURELY_SD, NOISE_TARGETS_MAX,
-    NOISE_TRIAL_NS_MAX, NOISE_TRIAL_SD,
+    CHI_SQUARE_MEDIAN, NOISE_ANGLE_SD_MAX_RAD, NOISE_CAUTION, NOISE_LOG_SCALE_MAX,
+    NOISE_LOG_STEP_MAX, NOISE_MEMORY, NOISE_PAIR_NS_MAX, NOISE_PAIR_WEIGHT, NOISE_PAIRS_MAX,
+    NOISE_PRIOR_SD, NOISE_ROBUST, NOISE_SATURATED, NOISE_SHARE_MIN, NOISE_SUM_LENGTH_MAX_M,
+    NOISE_SURELY_SD, NOISE_TARGETS_MAX, NOISE_TRIAL_NS_MAX, NOISE_TRIAL_SD, REPEATED_LOG_MAX,
+    REPEATED_SHARE, REPEATED_STEP,
 };
 use crate::input::{Label, Relation};
 use geometry::MotionSum;
@@ -49,6 +61,8 @@ pub(super) struct OdometryNoise {
     pub(super) information: Matrix4<f64>,
     /// What the assumed variances of lengths and of angles count for.
     pub(super) factors: [f64; 2],
+    /// Logarithms of the factors of seen distances and directions, as these repeat.
+    pub(super) repeated: [f64; 2],
     /// Whether odometry states its noise.
     pub(super) is_stated: bool,
     /// Motion since before the oldest anchor.
@@ -86,6 +100,7 @@ impl OdometryNoise {
             log_scales: Vector4::zeros(),
             information: Matrix4::zeros(),
             factors: [factor; 2],
+            repeated: [0.0; 2],
             is_stated,
             motion: NoisyMotion::default(),
             anchors: Vec::new(),
@@ -103,6 +118,21 @@ impl OdometryNoise {
         let least = if self.trial.is_some() { 1.0 } else { 0.0 };
         let learned = Vector6::from_fn(|k, _| assumed[k] * self.factors[k / 3].max(least));
         stated.map_or(learned, |stated| stated + learned)
+    }
+
+    /// A sighting with the variances that its sensor turns out to have at least.
+    pub(super) fn as_sensed(&self, mut innovation: PointInnovation) -> PointInnovation {
+        let factors = self.sensor_factors();
+        for k in 0..3 {
+            innovation.variance[k] *= factors[sensor_part(innovation.is_polar, k) - 2];
+        }
+        innovation
+    }
+
+    /// What the stated variances of seen distances and directions count for at least.
+    fn sensor_factors(&self) -> [f64; 2] {
+        self.repeated
+            .map(|log| (REPEATED_SHARE * log.exp()).max(1.0))
     }
 
     /// Goes on by a motion, as corrected, with the variances that are assumed and stated.
@@ -202,13 +232,15 @@ impl OdometryNoise {
         self.motion = NoisyMotion::default();
     }
 
-    /// A landmark was seen. Of odometry's lasting errors, these are the variances.
+    /// A landmark was seen. Of odometry's lasting errors, these are the variances. Whose odometry is
+    /// doubted tells of its sensor alone.
     pub(super) fn note(
         &mut self,
         label: &Label,
         stamp_ns: i64,
         relation: &Relation,
         lasting: &LastingErrors,
+        is_doubted: bool,
     ) {
         let is_recent =
             |anchor: &Anchor| stamp_ns.saturating_sub(anchor.stamp_ns) <= NOISE_PAIR_NS_MAX;
@@ -237,13 +269,23 @@ impl OdometryNoise {
         if !seen.is_power_of_two() {
             return;
         }
-        let residuals = anchor.residuals(stamp_ns, relation, &self.motion, lasting);
+        let mut residuals = anchor.residuals(stamp_ns, relation, &self.motion, lasting);
+        if seen == 1 {
+            for residual in &residuals {
+                self.learn_repeated(residual);
+            }
+        }
+        let sensor = self.sensor_factors();
+        for residual in &mut residuals {
+            residual.parts[2] *= sensor[0];
+            residual.parts[3] *= sensor[1];
+        }
         let is_saturated = residuals.iter().all(|residual| self.is_saturated(residual));
         // The comparison is linear in angles.
         let is_linear = |residual: &Residual| {
             !residual.is_angle || self.expected(residual) <= NOISE_ANGLE_SD_MAX_RAD.powi(2)
         };
-        if residuals.iter().all(is_linear) {
+        if !is_doubted && residuals.iter().all(is_linear) {
             for residual in &residuals {
                 self.learn(residual);
             }
@@ -270,6 +312,22 @@ impl OdometryNoise {
         let weighed = self.weighed(residual);
         let sensor = weighed[2] + weighed[3];
         weighed[0] + weighed[1] + residual.rest > NOISE_SATURATED * sensor
+    }
+
+    /// Learns of the sensor from two sightings in succession.
+    fn learn_repeated(&mut self, residual: &Residual) {
+        let [by_lengths, by_angles, distances, directions] = residual.parts.into();
+        let [of_distances, of_directions] = self.repeated.map(f64::exp);
+        let sensor = of_distances * distances + of_directions * directions;
+        let expected = by_lengths + by_angles + residual.rest + sensor;
+        let is_more = residual.square > CHI_SQUARE_MEDIAN * expected;
+        let step = if is_more {
+            REPEATED_STEP
+        } else {
+            -REPEATED_STEP
+        };
+        let log = &mut self.repeated[usize::from(residual.is_angle)];
+        *log = (*log + step).clamp(0.0, REPEATED_LOG_MAX);
     }
 
     fn learn(&mut self, residual: &Residual) {

@@ -95,7 +95,7 @@ impl RangeSensor {
 
 /// The variance that a distance states, never quite zero \[m²\].
 pub(super) fn stated(sd_m: f64) -> f64 {
-    sd_m * sd_m + SIGHTING_SD_MIN * SIGHTING_SD_MIN
+    sd_m.max(SIGHTING_SD_MIN).powi(2)
 }
 
 #[cfg(test)]

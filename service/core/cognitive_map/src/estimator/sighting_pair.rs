@@ -128,7 +128,7 @@ impl Anchor {
 }
 
 /// Which of the parts a component of a sighting belongs to.
-fn sensor_part(is_polar: bool, component: usize) -> usize {
+pub(super) fn sensor_part(is_polar: bool, component: usize) -> usize {
     if is_polar && component > 0 { 3 } else { 2 }
 }
 

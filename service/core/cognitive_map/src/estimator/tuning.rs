@@ -155,6 +155,16 @@ pub(super) const NOISE_CAUTION: f64 = 0.25;
 pub(super) const NOISE_TRIAL_SD: f64 = 0.3;
 /// Longest time from the first sighting until then \[ns\].
 pub(super) const NOISE_TRIAL_NS_MAX: i64 = 60_000_000_000;
+/// Step η of the logarithm of a sensor's factor. Source: what is understated tenfold is found out by
+/// some twenty pairs.
+pub(super) const REPEATED_STEP: f64 = 0.5;
+/// Largest logarithm of a sensor's factor: a thousand of deviations.
+pub(super) const REPEATED_LOG_MAX: f64 = 14.0;
+/// Part of it that counts. Source: what a sensor states to within a half of the deviation counts as
+/// it is stated.
+pub(super) const REPEATED_SHARE: f64 = 0.25;
+/// Median of the square of a Gaussian number of variance one.
+pub(super) const CHI_SQUARE_MEDIAN: f64 = 0.454_94;
 /// Parts of a covariance that are followed at a time, of eight agents, and the largest covariance
 /// of which they are. Source: work; each takes twice as long as the covariance itself.
 pub(super) const NOISE_SHARES_MAX: usize = 16;
@@ -164,8 +174,9 @@ pub(super) const NOISE_SHARE_DIM_MAX: usize = 192;
 
 /// Shortest distance at which a direction means something \[m\].
 pub(super) const DIRECTION_DISTANCE_MIN_M: f64 = 0.02;
-/// Least deviation of a component of a sighting \[m, rad\], so that none is without error.
-pub(super) const SIGHTING_SD_MIN: f64 = 1e-6;
+/// Least deviation of a component of a sighting \[m, rad\]: none is without error, also one that
+/// states so.
+pub(super) const SIGHTING_SD_MIN: f64 = 1e-3;
 /// How long a sighting of an agent waits for that agent's motion, by the observer's clock \[ns\].
 pub(super) const PENDING_NS_MAX: i64 = 2_000_000_000;
 /// How long an error of distance lasts \[s\]: until the robot sees its target from another side.

@@ -82,6 +82,21 @@ fn noise_that_is_stated_wrongly_costs_little() {
     }
 }
 
+/// Who states that a sensor has no errors, or hundreds of times too small ones, is told by what it
+/// sees: its sightings contradict one another.
+#[test]
+fn a_sensor_that_states_no_errors_misleads_little() {
+    for stated in [0.0, 1e-3, 0.03] {
+        compare(
+            |hall| Hall { stated, ..hall },
+            |_, with| {
+                let worst_m = with.worst_rmse_m(0..4, 0);
+                assert!(worst_m < 0.3, "{stated}: {worst_m}");
+            },
+        );
+    }
+}
+
 #[test]
 fn a_robot_that_slipped_or_was_carried_away_comes_back() {
     for (name, slip, steps) in [

@@ -107,6 +107,7 @@ state_of_struct!(OdometryNoise {
     log_scales,
     information,
     factors,
+    repeated,
     is_stated,
     motion,
     anchors as ListUpTo<NOISE_TARGETS_MAX>,
