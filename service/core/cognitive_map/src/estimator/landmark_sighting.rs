@@ -39,7 +39,8 @@ impl Estimator {
         let state = frame.members[observer].state_mut();
         if !matches!(relation, Relation::Range(_)) {
             let is_doubted = state.is_doubted();
-            { &mut state.filter }.learn_noise(called, stamp_ns, relation, is_doubted);
+            let filter = &mut state.filter;
+            filter.learn_noise(called, stamp_ns, relation, is_doubted);
             if !is_doubted {
                 frame.take_back_noise(observer, stamp_ns);
             }

@@ -92,7 +92,7 @@ impl Frame {
     /// A sighting with the variances that the observer's sensor turns out to have at least.
     fn as_sensed(&self, measurement: &Measurement<'_>, seen: PointInnovation) -> PointInnovation {
         let observer = &self.members[measurement.observer];
-        observer.filter().noise.as_sensed(seen)
+        observer.filter().noise.understated.as_sensed(seen)
     }
 
     /// Another member was seen, which has moved by `back` since.

@@ -24,9 +24,10 @@
 //! - **Doubt.** Components far from what is expected lose weight, sightings farther off are
 //!   refused; an agent whose sightings are refused again and again searches farther around, and a
 //!   landmark that only contradicts is forgotten.
-//! - **Noise.** That of each agent's sensor is learned, upwards from what it states; that of its
-//!   odometry, from pairs of sightings (`odometry_noise`); what was assumed of it too much before
-//!   is taken back (`noise_share`).
+//! - **Noise.** That of each agent's sensor is learned, upwards from what it states, by the map and
+//!   by how its sightings repeat (`understated_noise`); that of its odometry, from pairs of
+//!   sightings (`odometry_noise`); what was assumed of it too much before is taken back
+//!   (`noise_share`).
 //! - **Absurd evidence.** What a doubted agent sees corrects itself alone; one that contradicts
 //!   everything for long, or may be anywhere, is set aside in a frame of its own, with its
 //!   landmarks (`set_aside`).
@@ -81,6 +82,7 @@ mod sightings;
 mod standing;
 mod state;
 mod tuning;
+mod understated_noise;
 mod verdict;
 
 pub use calibration::{Calibrated, Calibration, LASTING_DIM, LastingErrors};

@@ -25,29 +25,18 @@
 //!   was too large by is taken back then ([`NoiseTrial`]).
 //! - **Stated noise** counts at least. Beside it counts as much of the assumed noise as is certain
 //!   to be there, so that a robot that states too little does not bend the map.
-//!
-//! A sensor that states far too little contradicts the map, and so is never taken in and judged
-//! there; but its sightings contradict one another, too. Its factor f follows the median of two in
-//! succession, by steps of ln f, with odometry as noisy as it is assumed to be:
-//!
-//! ```text
-//! ln f ← ln f ± η      + where ν² > ½ (Σ_{i ≤ 2} q_i + r + f Σ_{i > 2} q_i)      ln f ≥ 0
-//! ```
-//!
-//! What it states counts for f/4 at least: half of a deviation is left to the map.
 
 use nalgebra::{Isometry3, Matrix4, Matrix6, Vector4, Vector6};
 
 use super::calibration::LastingErrors;
-use super::innovation::PointInnovation;
-use super::sighting_pair::{Anchor, NoisyMotion, Residual, sensor_part};
+use super::sighting_pair::{Anchor, NoisyMotion, Residual};
 use super::tuning::{
-    CHI_SQUARE_MEDIAN, NOISE_ANGLE_SD_MAX_RAD, NOISE_CAUTION, NOISE_LOG_SCALE_MAX,
-    NOISE_LOG_STEP_MAX, NOISE_MEMORY, NOISE_PAIR_NS_MAX, NOISE_PAIR_WEIGHT, NOISE_PAIRS_MAX,
-    NOISE_PRIOR_SD, NOISE_ROBUST, NOISE_SATURATED, NOISE_SHARE_MIN, NOISE_SUM_LENGTH_MAX_M,
-    NOISE_SURELY_SD, NOISE_TARGETS_MAX, NOISE_TRIAL_NS_MAX, NOISE_TRIAL_SD, REPEATED_LOG_MAX,
-    REPEATED_SHARE, REPEATED_STEP,
+    NOISE_ANGLE_SD_MAX_RAD, NOISE_CAUTION, NOISE_LOG_SCALE_MAX, NOISE_LOG_STEP_MAX, NOISE_MEMORY,
+    NOISE_PAIR_NS_MAX, NOISE_PAIR_WEIGHT, NOISE_PAIRS_MAX, NOISE_PRIOR_SD, NOISE_ROBUST,
+    NOISE_SATURATED, NOISE_SHARE_MIN, NOISE_SUM_LENGTH_MAX_M, NOISE_SURELY_SD, NOISE_TARGETS_MAX,
+    NOISE_TRIAL_NS_MAX, NOISE_TRIAL_SD,
 };
+use super::understated_noise::UnderstatedNoise;
 use crate::input::{Label, Relation};
 use geometry::MotionSum;
 
@@ -61,8 +50,8 @@ pub(super) struct OdometryNoise {
     pub(super) information: Matrix4<f64>,
     /// What the assumed variances of lengths and of angles count for.
     pub(super) factors: [f64; 2],
-    /// Logarithms of the factors of seen distances and directions, as these repeat.
-    pub(super) repeated: [f64; 2],
+    /// What the sensor states too little.
+    pub(super) understated: UnderstatedNoise,
     /// Whether odometry states its noise.
     pub(super) is_stated: bool,
     /// Motion since before the oldest anchor.
@@ -100,7 +89,7 @@ impl OdometryNoise {
             log_scales: Vector4::zeros(),
             information: Matrix4::zeros(),
             factors: [factor; 2],
-            repeated: [0.0; 2],
+            understated: UnderstatedNoise::default(),
             is_stated,
             motion: NoisyMotion::default(),
             anchors: Vec::new(),
@@ -120,21 +109,6 @@ impl OdometryNoise {
         stated.map_or(learned, |stated| stated + learned)
     }
 
-    /// A sighting with the variances that its sensor turns out to have at least.
-    pub(super) fn as_sensed(&self, mut innovation: PointInnovation) -> PointInnovation {
-        let factors = self.sensor_factors();
-        for k in 0..3 {
-            innovation.variance[k] *= factors[sensor_part(innovation.is_polar, k) - 2];
-        }
-        innovation
-    }
-
-    /// What the stated variances of seen distances and directions count for at least.
-    fn sensor_factors(&self) -> [f64; 2] {
-        self.repeated
-            .map(|log| (REPEATED_SHARE * log.exp()).max(1.0))
-    }
-
     /// Goes on by a motion, as corrected, with the variances that are assumed and stated.
     #[inline]
     pub(super) fn append(
@@ -144,7 +118,10 @@ impl OdometryNoise {
         stated: Option<&Vector6<f64>>,
     ) {
         if self.is_stated != stated.is_some() {
-            *self = Self::new(stated.is_some());
+            *self = Self {
+                understated: self.understated,
+                ..Self::new(stated.is_some())
+            };
         }
         if self.anchors.is_empty() && self.trial.is_none() {
             return;
@@ -271,14 +248,10 @@ impl OdometryNoise {
         }
         let mut residuals = anchor.residuals(stamp_ns, relation, &self.motion, lasting);
         if seen == 1 {
-            for residual in &residuals {
-                self.learn_repeated(residual);
-            }
+            self.understated.learn(&residuals);
         }
-        let sensor = self.sensor_factors();
         for residual in &mut residuals {
-            residual.parts[2] *= sensor[0];
-            residual.parts[3] *= sensor[1];
+            self.understated.scale(residual);
         }
         let is_saturated = residuals.iter().all(|residual| self.is_saturated(residual));
         // The comparison is linear in angles.
@@ -312,22 +285,6 @@ impl OdometryNoise {
         let weighed = self.weighed(residual);
         let sensor = weighed[2] + weighed[3];
         weighed[0] + weighed[1] + residual.rest > NOISE_SATURATED * sensor
-    }
-
-    /// Learns of the sensor from two sightings in succession.
-    fn learn_repeated(&mut self, residual: &Residual) {
-        let [by_lengths, by_angles, distances, directions] = residual.parts.into();
-        let [of_distances, of_directions] = self.repeated.map(f64::exp);
-        let sensor = of_distances * distances + of_directions * directions;
-        let expected = by_lengths + by_angles + residual.rest + sensor;
-        let is_more = residual.square > CHI_SQUARE_MEDIAN * expected;
-        let step = if is_more {
-            REPEATED_STEP
-        } else {
-            -REPEATED_STEP
-        };
-        let log = &mut self.repeated[usize::from(residual.is_angle)];
-        *log = (*log + step).clamp(0.0, REPEATED_LOG_MAX);
     }
 
     fn learn(&mut self, residual: &Residual) {

@@ -24,6 +24,10 @@ pub(crate) struct Hall {
     pub(crate) steps: usize,
     /// Deviations of sightings as they are stated, over the true ones.
     pub(crate) stated: f64,
+    /// Robots that state them so; the others state the true ones.
+    pub(crate) stated_by: std::ops::Range<usize>,
+    /// Share of sightings of something else, anywhere within reach.
+    pub(crate) mistaken: f64,
     /// Whether the motion's noise is stated, and the same factor there.
     pub(crate) stated_motion: Option<f64>,
     /// What robot 0 says instead of what it sees, from this step on.
@@ -55,6 +59,8 @@ impl Default for Hall {
             seed: 1,
             steps: 400,
             stated: 1.0,
+            stated_by: 0..ROBOTS,
+            mistaken: 0.0,
             stated_motion: None,
             lie: None,
             slip: None,
@@ -195,7 +201,7 @@ impl Hall {
                 (Some(since), 0 | 1) if step >= since => 1 - post,
                 _ => post,
             };
-            let relation = self.relation(liar, &pose, &posts[post], random);
+            let relation = self.relation((robot, liar), &pose, &posts[post], random);
             estimator.landmark(
                 number(robot),
                 stamp_ns,
@@ -211,7 +217,7 @@ impl Hall {
         if !others.is_empty() {
             let other = others[step % others.len()];
             let point = Point3::from(truth[other].translation.vector);
-            let relation = self.relation(liar, &pose, &point, random);
+            let relation = self.relation((robot, liar), &pose, &point, random);
             estimator.sighting(
                 number(robot),
                 stamp_ns,
@@ -225,7 +231,7 @@ impl Hall {
     /// What a robot tells of a point.
     fn relation(
         &self,
-        liar: Option<Lie>,
+        (robot, liar): (usize, Option<Lie>),
         pose: &Isometry3<f64>,
         point: &Point3<f64>,
         random: &mut Seeded,
@@ -237,7 +243,16 @@ impl Hall {
         if let Some(lie) = liar {
             (range_m, azimuth_rad) = lie(random, range_m, azimuth_rad);
         }
-        let (range_sd_m, bearing_sd_rad) = (range_sd_m * self.stated, BEARING_SD_RAD * self.stated);
+        if self.mistaken > 0.0 && random.uniform() < self.mistaken {
+            range_m = RANGE_M * random.uniform();
+            azimuth_rad = std::f64::consts::PI * (2.0 * random.uniform() - 1.0);
+        }
+        let stated = if self.stated_by.contains(&robot) {
+            self.stated
+        } else {
+            1.0
+        };
+        let (range_sd_m, bearing_sd_rad) = (range_sd_m * stated, BEARING_SD_RAD * stated);
         let seen = RangeBearing::new(range_m, azimuth_rad, 0.0, range_sd_m, bearing_sd_rad);
         Relation::RangeBearing(seen.unwrap())
     }

@@ -65,14 +65,16 @@ impl ChannelModel {
         }
     }
 
-    /// Whether views as alike as those of a class, or less, are known to be much nearer.
+    /// Whether views as alike as those of a class are known to be much nearer, and so are all that
+    /// are less alike.
     fn is_far(&self, class: usize, distance_m: f64) -> bool {
         let known = self.distances_m.iter().skip(class);
-        let mut known = known.filter(|class| class.count() >= tuning::USUAL_MIN);
-        known.any(|class| {
+        let known = known.filter(|class| class.count() >= tuning::USUAL_MIN);
+        let most_m = known.map(|class| {
             let sd_m = class.sd().max(tuning::SD_M_MIN);
-            distance_m > tuning::FAR * (class.mean() + 3.0 * sd_m)
-        })
+            tuning::FAR * (class.mean() + 3.0 * sd_m)
+        });
+        { most_m.reduce(f64::max) }.is_some_and(|most_m| distance_m > most_m)
     }
 
     /// Learns from two views that are far from one another along the way, which stand for so many

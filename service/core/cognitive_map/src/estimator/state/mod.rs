@@ -36,6 +36,7 @@ use super::tuning::{
     HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, NOISE_SHARES_MAX, NOISE_TARGETS_MAX, OBSERVERS_MAX,
     PENDING_MAX, RANGE_POINTS_MAX, RANGED_MAX, SENSOR_TARGETS_MAX,
 };
+use super::understated_noise::UnderstatedNoise;
 use ::state::{
     Codec, CorruptState, PagedVec, State, StateReader, StateWriter, state_of_enum, state_of_struct,
 };
@@ -107,12 +108,13 @@ state_of_struct!(OdometryNoise {
     log_scales,
     information,
     factors,
-    repeated,
+    understated,
     is_stated,
     motion,
     anchors as ListUpTo<NOISE_TARGETS_MAX>,
     trial
 });
+state_of_struct!(UnderstatedNoise { log_factors, pairs });
 state_of_struct!(NoiseTrial {
     seen_ns,
     followed_ns,
