@@ -165,6 +165,10 @@ pub(super) const UNDERSTATED_PAIRS: f64 = 100.0;
 /// numbers of variance one, and the share p below it. Source: of pairs of sightings of which a third
 /// are false, hardly half are right.
 pub(super) const UNDERSTATED_QUANTILE: ([f64; 3], f64) = ([0.148_47, 0.564_94, 0.946_68], 0.3);
+/// Least deviation that counts before so many pairs of sightings have repeated \[m, rad\]. Source: of
+/// cameras and lasers on robots hardly one is better.
+pub(super) const UNDERSTATED_SD_FIRST: f64 = 0.01;
+pub(super) const UNDERSTATED_PAIRS_FIRST: u32 = 30;
 /// Largest logarithm of a sensor's factor: a thousand of deviations.
 pub(super) const UNDERSTATED_LOG_MAX: f64 = 14.0;
 /// Part of it that counts. Source: what a sensor states to within a half of the deviation counts as

@@ -12,13 +12,14 @@
 //! ```
 //!
 //! with the parts of the residual's variance that [`OdometryNoise`](super::odometry_noise) learns
-//! from. A stated variance counts for f/4 at least: half of a deviation is left to the map.
+//! from. Before some have repeated, no sensor is believed to be better than a centimetre or a
+//! hundredth of a radian. A stated variance counts for f/4 at least: half of a deviation is left to the map.
 
 use super::innovation::PointInnovation;
 use super::sighting_pair::{Residual, sensor_part};
 use super::tuning::{
-    UNDERSTATED_LOG_MAX, UNDERSTATED_PAIRS, UNDERSTATED_QUANTILE, UNDERSTATED_SD_MAX,
-    UNDERSTATED_SHARE, UNDERSTATED_STEP,
+    UNDERSTATED_LOG_MAX, UNDERSTATED_PAIRS, UNDERSTATED_PAIRS_FIRST, UNDERSTATED_QUANTILE,
+    UNDERSTATED_SD_FIRST, UNDERSTATED_SD_MAX, UNDERSTATED_SHARE, UNDERSTATED_STEP,
 };
 
 /// Factors of what an agent's sensor states of its noise.
@@ -46,13 +47,20 @@ impl UnderstatedNoise {
         for k in 0..3 {
             let part = sensor_part(innovation.is_polar, k) - 2;
             let lever_m = if part == 0 {
-                innovation.distance_m
+                innovation.distance_m.max(1.0)
             } else {
                 1.0
             };
             let most = (UNDERSTATED_SD_MAX * lever_m).powi(2);
-            let stated = innovation.variance[k];
-            innovation.variance[k] = (stated * least[part]).min(most).max(stated);
+            let is_new = self.pairs < UNDERSTATED_PAIRS_FIRST;
+            let first = if is_new { UNDERSTATED_SD_FIRST } else { 0.0 };
+            let stated = innovation.variance[k].max(first * first);
+            let turned_out = stated * least[part];
+            innovation.variance[k] = if turned_out <= most {
+                turned_out
+            } else {
+                stated
+            };
         }
         innovation
     }
