@@ -91,7 +91,7 @@ fn a_sensor_that_states_no_errors_misleads_little() {
             |hall| Hall { stated, ..hall },
             |_, with| {
                 let worst_m = with.worst_rmse_m(0..4, 0);
-                assert!(worst_m < 0.42, "{stated}: {worst_m}");
+                assert!(worst_m < 0.3, "{stated}: {worst_m}");
             },
         );
         compare(
@@ -103,7 +103,7 @@ fn a_sensor_that_states_no_errors_misleads_little() {
             |_, with| {
                 let (own_m, others_m) = (with.rmse_m(0, 0), with.worst_rmse_m(1..4, 0));
                 assert!(
-                    own_m < 0.3 && others_m < 0.2,
+                    own_m < 0.2 && others_m < 0.1,
                     "{stated}: {own_m} {others_m}"
                 );
                 let off = |post| (with.post(post).unwrap() - with.posts[post]).norm();
