@@ -209,7 +209,7 @@ impl OdometryNoise {
         self.motion = NoisyMotion::default();
     }
 
-    /// A landmark was seen. Of odometry's lasting errors, these are the variances. Whose odometry is
+    /// A landmark was seen. Of odometry's lasting errors, these are the variances. An agent that is
     /// doubted tells of its sensor alone.
     pub(super) fn note(
         &mut self,

@@ -155,18 +155,18 @@ pub(super) const NOISE_CAUTION: f64 = 0.25;
 pub(super) const NOISE_TRIAL_SD: f64 = 0.3;
 /// Longest time from the first sighting until then \[ns\].
 pub(super) const NOISE_TRIAL_NS_MAX: i64 = 60_000_000_000;
-/// Steps η of the logarithm of a sensor's factor: the first, and the least, and the pairs of
-/// sightings after which it is half of the first. Source: what is understated a hundredfold is found
-/// out by some forty pairs, a few seconds of some landmarks; small steps later leave what is stated
-/// right as it is.
+/// Steps η of the logarithm of a sensor's factor, the first and the least, and the pairs of
+/// sightings after which it is half of the first. Source: what is understated a hundredfold is
+/// found out by some forty pairs, a few seconds of some landmarks; small steps later leave what is
+/// stated right as it is.
 pub(super) const UNDERSTATED_STEP: (f64, f64) = (1.0, 0.2);
 pub(super) const UNDERSTATED_PAIRS: f64 = 100.0;
-/// The quantile that a sensor's factor follows: of the largest square of one, two and three Gaussian
-/// numbers of variance one, and the share p below it. Source: of pairs of sightings of which a third
-/// are false, hardly half are right.
+/// The quantile that a sensor's factor follows: of the largest square of one, two and three
+/// Gaussian numbers of variance one, and the share p below it. Source: where a third of the
+/// sightings are false, hardly half of the pairs are right.
 pub(super) const UNDERSTATED_QUANTILE: ([f64; 3], f64) = ([0.148_47, 0.564_94, 0.946_68], 0.3);
-/// Least deviation that counts before so many pairs of sightings have repeated \[m, rad\]. Source: of
-/// cameras and lasers on robots hardly one is better.
+/// Least deviation that counts before so many pairs of sightings have repeated \[m, rad\]. Source:
+/// of cameras and lasers on robots hardly one is better.
 pub(super) const UNDERSTATED_SD_FIRST: f64 = 0.01;
 pub(super) const UNDERSTATED_PAIRS_FIRST: u32 = 30;
 /// Largest logarithm of a sensor's factor: a thousand of deviations.
@@ -174,8 +174,8 @@ pub(super) const UNDERSTATED_LOG_MAX: f64 = 14.0;
 /// Part of it that counts. Source: what a sensor states to within a half of the deviation counts as
 /// it is stated.
 pub(super) const UNDERSTATED_SHARE: f64 = 0.25;
-/// Largest deviation that counts so, as a part of the distance, and of directions \[rad\]. Source: a
-/// camera that sees three degrees wrong is a bad one; *liars*.
+/// Largest deviation that counts so, as a part of the distance, and of directions \[rad\]. Source:
+/// a camera that sees three degrees wrong is a bad one; *liars*.
 pub(super) const UNDERSTATED_SD_MAX: f64 = 0.05;
 /// Parts of a covariance that are followed at a time, of eight agents, and the largest covariance
 /// of which they are. Source: work; each takes twice as long as the covariance itself.

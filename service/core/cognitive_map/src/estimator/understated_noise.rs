@@ -3,8 +3,8 @@
 //! A sensor that states far too little contradicts the map, and so is not taken in and judged there
 //! ([`Sensor`](super::sensor::Sensor)); but its sightings contradict one another, too. Two of one
 //! landmark in succession differ by the sensor's noise and by odometry's, whatever the map is. The
-//! factors f, of distances and of directions, follow a low quantile of that, so that false sightings
-//! count little, by steps of ln f, with odometry as noisy as it is assumed to be:
+//! factors f, of distances and of directions, follow a low quantile of that, so that false
+//! sightings count little, by steps of ln f, with odometry as noisy as it is assumed to be:
 //!
 //! ```text
 //! u = ν² / (q₁ + q₂ + r + f₁ q₃ + f₂ q₄)      of the component where it is largest
@@ -13,7 +13,8 @@
 //!
 //! with the parts of the residual's variance that [`OdometryNoise`](super::odometry_noise) learns
 //! from. Before some have repeated, no sensor is believed to be better than a centimetre or a
-//! hundredth of a radian. A stated variance counts for f/4 at least: half of a deviation is left to the map.
+//! hundredth of a radian. A stated variance counts for f/4 at least: half of a deviation is left to
+//! the map.
 
 use super::innovation::PointInnovation;
 use super::sighting_pair::{Residual, sensor_part};
