@@ -109,6 +109,11 @@ impl Contact {
         self
     }
 
+    /// Its level on a channel.
+    pub(crate) fn level(&self, channel: u16) -> Option<&LevelReading> {
+        self.levels.iter().find(|own| own.channel == channel)
+    }
+
     /// The same without levels and descriptors.
     pub(crate) fn bare(&self) -> Self {
         Self {

@@ -27,6 +27,8 @@ pub(crate) struct IndexedModel {
     pub(crate) area_m2: f64,
     /// Typical distance between neighbouring places that were felt \[m\].
     pub(crate) gap_m: f64,
+    /// Whether its places lie along lines.
+    pub(crate) is_curve: bool,
     /// Standard deviation of what was predicted between the places \[m\]; none where nothing was.
     pub(crate) between_sd_m: Option<f64>,
     /// Where contacts fell on places alone: probability that one is with a place that was missed.
@@ -71,7 +73,7 @@ impl IndexedModel {
                 position: place.position_m,
                 normal: place.normal(),
                 variance_m2: field_m(own).powi(2) + place.variance_m2 / (place.count * place.count),
-                is_predicted: false,
+                prediction: None,
                 levels: place.levels.clone(),
                 descriptors: place.descriptors.clone(),
             })
@@ -99,6 +101,7 @@ impl IndexedModel {
             surfel_map: SurfelMap::new(model),
             extent_m,
             gap_m: graph.typical_m,
+            is_curve: graph.is_curve(),
             between_sd_m: between_sd_m(&places),
             missed_share: (spread == Spread::OnPlaces).then(|| missed_share(model.places())),
             own_levels: object_levels(places.iter().flat_map(|place| &place.levels)),
@@ -117,7 +120,7 @@ impl IndexedModel {
 
 /// Standard deviation of what was predicted between the places \[m\].
 fn between_sd_m(places: &[IndexedPlace]) -> Option<f64> {
-    let predicted = places.iter().filter(|place| place.is_predicted);
+    let predicted = places.iter().filter(|place| place.prediction.is_some());
     let (count, sum) = predicted.fold((0.0, 0.0), |(count, sum), place| {
         (count + 1.0, sum + place.variance_m2)
     });

@@ -1,6 +1,6 @@
 //! One place of a model, ready for recognition.
 
-use nalgebra::{Point3, Unit, Vector3};
+use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 use crate::contact::{Contact, DescriptorReading};
 use crate::level_prior::LevelPrior;
@@ -15,31 +15,35 @@ pub(crate) struct IndexedPlace {
     /// Variance of a touch of this place about `position`, without the touch's noise, per axis
     /// \[m²\].
     pub(crate) variance_m2: f64,
-    /// Whether it was predicted from the places around, and not felt.
-    pub(crate) is_predicted: bool,
+    /// How it was predicted; none of a place that was felt.
+    pub(crate) prediction: Option<Prediction>,
     pub(crate) levels: Vec<LevelMemory>,
     pub(crate) descriptors: Vec<DescriptorReading>,
 }
 
+/// How a place was predicted from the places around.
+#[derive(Clone, Debug)]
+pub(crate) struct Prediction {
+    /// Variance of its error across the surface, per axis \[m²\].
+    pub(crate) error_m2: f64,
+    /// Projects an offset on what is across the surface.
+    pub(crate) across: Matrix3<f64>,
+}
+
 impl IndexedPlace {
+    /// Its level on a channel.
+    pub(crate) fn level(&self, channel: u16) -> Option<&LevelMemory> {
+        self.levels.iter().find(|own| own.channel == channel)
+    }
+
     /// Log likelihood ratio of a contact's levels and descriptors: at this place, against anywhere.
     pub(crate) fn percept_log(&self, contact: &Contact, level_prior: &[LevelPrior]) -> f64 {
         let mut sum = 0.0;
         for reading in &contact.levels {
-            let own = self
-                .levels
-                .iter()
-                .find(|own| own.channel == reading.channel);
-            let level_prior = level_prior
-                .iter()
-                .find(|level_prior| level_prior.channel == reading.channel);
-            if let (Some(own), Some(level_prior)) = (own, level_prior) {
-                let variance = own.variance() + level_prior.noise(reading);
-                let apart = reading.value - own.mean;
-                let here = (-0.5 * apart * apart / variance).exp() / variance.sqrt();
-                sum += ((1.0 - WRONG_PERCEPT_SHARE) * here / level_prior.density(reading)
-                    + WRONG_PERCEPT_SHARE)
-                    .ln();
+            let own = self.level(reading.channel);
+            let prior = LevelPrior::of(level_prior, reading.channel);
+            if let Some((own, prior)) = own.zip(prior) {
+                sum += prior.ratio(reading, own.mean, own.variance()).ln();
             }
         }
         sum + self.descriptor_log(contact)

@@ -148,6 +148,19 @@ impl LevelPrior {
         }
     }
 
+    /// Of a channel, if the library has it.
+    pub(crate) fn of(priors: &[Self], channel: u16) -> Option<&Self> {
+        priors.iter().find(|own| own.channel == channel)
+    }
+
+    /// Likelihood ratio of a reading: at a place of this level, against anywhere.
+    pub(crate) fn ratio(&self, reading: &LevelReading, mean: f64, variance: f64) -> f64 {
+        let variance = variance + self.noise(reading);
+        let apart = reading.value - mean;
+        let here = (-0.5 * apart * apart / variance).exp() / variance.sqrt();
+        (1.0 - WRONG_PERCEPT_SHARE) * here / self.density(reading) + WRONG_PERCEPT_SHARE
+    }
+
     /// Variance of the noise of a reading: its own, and a part of that of the levels like it.
     pub(crate) fn noise(&self, reading: &LevelReading) -> f64 {
         let log = |component: &Component| {

@@ -277,6 +277,7 @@ fn the_evidence_is_that_of_all_assignments_of_contacts_to_places() {
                 contact,
                 BTreeMap::new(),
                 &|_| 0.0,
+                None,
             );
             let contacts = &contacts[..=count];
             let found = |id: u32| translations.object_logs()[&ObjectId(id)];

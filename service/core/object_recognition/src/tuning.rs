@@ -107,6 +107,15 @@ pub(crate) const OPEN_CURVE_COS: f64 = -0.25;
 /// Share of the variance of places across a plane below which they lie in it: a seventh of the
 /// deviation. Chosen.
 pub(crate) const FLAT_SHARE: f64 = 0.02;
+/// Least correlation of the errors at two contacts by which the one tells of the other. Chosen.
+pub(crate) const SHARED_MIN: f64 = 0.05;
+/// Deviations from what is predicted beyond which a contact tells nothing of these errors: it is
+/// with something else. Chosen.
+pub(crate) const SHARED_DEVIATIONS: f64 = 3.0;
+/// Contacts before another one by which a surface goes on, the nearest. Budget.
+pub(crate) const CONTINUED_NEAREST: usize = 6;
+/// The same at least: three span a plane. Derived.
+pub(crate) const CONTINUED_MIN: usize = 3;
 /// Distance within which the errors of what lies between places are common, in typical links: less
 /// than half a gap, beyond which other places tell what is predicted. Chosen.
 pub(crate) const ERROR_REACH: f64 = 0.35;
@@ -164,10 +173,10 @@ pub(crate) const FIELD_NOISES: [f64; 4] = [1e-4, 1e-2, 0.1, 1.0];
 /// Fewer places tell nothing of what lies between and beyond them: of twenty contacts some fall on
 /// one place. Chosen.
 pub(crate) const BETWEEN_MIN: usize = 16;
-/// Deviations by which the share of a level's variance that neighbours leave open is below one,
-/// where n places have a deviation of 1/√n: else what is felt at a place says little of what lies
-/// beside it. Chosen.
-pub(crate) const PREDICTED_DEVIATIONS: f64 = 2.6;
+/// Log-likelihood ratio of all levels of a model, each predicted by its neighbours, against levels
+/// that have nothing to do with them: less says little of what lies beside a place \[nats\].
+/// Chosen.
+pub(crate) const PREDICTED_NATS: f64 = 10.0;
 /// Degrees of freedom of the errors of a field: few are far larger than the rest. Chosen.
 pub(crate) const TAILS: f64 = 4.0;
 /// Places whose errors scale the variance of a field around. Chosen.

@@ -1,13 +1,13 @@
 //! What a model's places say of how a field varies between them.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::graph::{LinkGraph, median};
 use super::kriging::{Kriging, Weights};
 use crate::model::{LevelMemory, ModelPlace};
 use crate::tuning::{
     ERROR_NEIGHBOURS, FIELD_LENGTHS, FIELD_NOISES, FIELD_SAMPLES, KRIGING_CURVE, KRIGING_SURFACE,
-    PREDICTED_DEVIATIONS, SHRINKAGE, TAILS,
+    PREDICTED_NATS, SHRINKAGE, TAILS,
 };
 
 /// What varies over a surface.
@@ -141,8 +141,10 @@ impl Field {
         }
     }
 
-    /// Whether the places around surely tell something of what is felt at a place: they leave less
-    /// of its variance open than they would by chance.
+    /// Whether the places around surely tell something of what is felt at a place.
+    ///
+    /// If they leave the share s of the variance of n levels open, the log-likelihood ratio of
+    /// Gaussian levels that follow from them to independent ones is −n/2 ln s.
     pub(super) fn is_predictable(&self, left_out: &[LeftOut], places: &[ModelPlace]) -> bool {
         let FieldOf::Level(channel) = self.of else {
             return true;
@@ -158,7 +160,7 @@ impl Field {
             .map(|level| (level - mean).powi(2))
             .sum::<f64>()
             / n;
-        let open = 1.0 - PREDICTED_DEVIATIONS / f64::sqrt(f64::max(count, 1.0));
+        let open = (-2.0 * PREDICTED_NATS / f64::max(count, 1.0)).exp();
         error <= open * variance * count
     }
 
@@ -274,6 +276,12 @@ impl LocalField {
         let weights = self.weights(point);
         let variance = self.variance * (weights.variance + self.roughness);
         (weights, variance)
+    }
+
+    /// Projects an offset on what is across the plane or line over which places are predicted.
+    pub(super) fn across(&self) -> Matrix3<f64> {
+        let axes = self.over.iter().flat_map(|over| &over.axes);
+        Matrix3::identity() - { axes.map(|axis| axis * axis.transpose()) }.sum::<Matrix3<f64>>()
     }
 
     fn weights(&self, point: &Point3<f64>) -> Weights {

@@ -6,7 +6,7 @@ use super::field::{Field, FieldOf, LocalField, Site};
 use super::graph::LinkGraph;
 use super::sides::Sides;
 use super::taken::Taken;
-use crate::indexed_place::IndexedPlace;
+use crate::indexed_place::{IndexedPlace, Prediction};
 use crate::model::{LevelMemory, ModelPlace};
 use crate::tuning::{
     BETWEEN_MIN, DENSE_LINK, KRIGING_SURFACE, NODE_APART, NODE_ERROR, NODE_FIELD, NODE_STEP,
@@ -264,7 +264,10 @@ impl LocalFields {
             position,
             normal: nalgebra::Unit::try_new(normals, 1e-9),
             variance_m2: field_m * field_m + across_m2,
-            is_predicted: true,
+            prediction: Some(Prediction {
+                error_m2: across_m2,
+                across: self.place.across(),
+            }),
             levels: self.levels.iter().filter_map(level).collect(),
             descriptors: nearest.map_or_else(Vec::new, |place| place.descriptors.clone()),
         }

@@ -91,14 +91,14 @@ impl OpenRegion {
         if !is_open_anywhere && !has_nodes && spread == Spread::Even {
             return None;
         }
-        // A gap begins beyond the field of a place, which is as wide as a spacing or a link.
+        // A gap begins beyond the field of a place, which is as wide as two nodes are apart at most.
         let gap_m2 = |own: usize| {
             if spread == Spread::OnPlaces {
                 return (0.5 * spacing_m).powi(2);
             }
             let mean_m = graph.mean_link_m(own, felt).unwrap_or(0.0);
             if has_nodes && mean_m > NODE_STEP * spacing_m {
-                (0.5 * mean_m).powi(2)
+                (0.5 * NODE_STEP * spacing_m).powi(2)
             } else {
                 f64::INFINITY
             }

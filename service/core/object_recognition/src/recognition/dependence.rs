@@ -46,11 +46,11 @@ fn error_share(indexed: &IndexedModel, point: &Point3<f64>, contact: &Contact) -
             return;
         }
         let mut share = 0.0;
-        if place.is_predicted {
+        if place.prediction.is_some() {
             let noise = contact.position_sd_m * contact.position_sd_m;
             share = place.variance_m2 / (place.variance_m2 + noise).max(f64::MIN_POSITIVE);
             for reading in &contact.levels {
-                let own = { place.levels.iter() }.find(|own| own.channel == reading.channel);
+                let own = place.level(reading.channel);
                 if let Some(own) = own {
                     let all = own.variance() + reading.sd * reading.sd;
                     share = f64::max(share, own.variance() / all.max(f64::MIN_POSITIVE));

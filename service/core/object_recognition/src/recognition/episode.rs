@@ -85,7 +85,8 @@ impl Recognition {
             Hypotheses::Translations(translations) => {
                 let share_log = step_share_logs(library, reach_m);
                 let share = |object| library.indexed(object).map_or(0.0, &share_log);
-                let log = translations.touch(library, &self.contacts, &contact, sizes, &share);
+                let log =
+                    translations.touch(library, &self.contacts, &contact, sizes, &share, reach_m);
                 translations.settle();
                 log
             }

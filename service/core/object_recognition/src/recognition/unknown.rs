@@ -141,7 +141,7 @@ impl Recognition {
         let pose = pose()?;
         let share = |reach| evidence_share(indexed, &pose, &self.contacts, reach);
         if lead > 0.0 {
-            return Some(lead * share(UNKNOWN_ERROR_REACH));
+            return Some(f64::max(lead * share(UNKNOWN_ERROR_REACH), lead.min(doubt)));
         }
         let library = leads.library * share(ERROR_REACH);
         Some(UnknownLogs { library, ..leads }.log().min(0.0))

@@ -1,5 +1,6 @@
 //! What lies between few contacts without normals.
 
+use super::unknown::{WAVES, run_over, taught};
 use super::*;
 use crate::indexed_model::IndexedModel;
 
@@ -18,7 +19,11 @@ fn errors(shape: Shape, off_m: fn(&Point3<f64>) -> f64) -> [Vec<f64>; 2] {
             model.learn(&Contact::at(felt.position_m, NOISE_M));
         }
         let indexed = IndexedModel::new(&model);
-        for place in indexed.places.iter().filter(|place| place.is_predicted) {
+        for place in indexed
+            .places
+            .iter()
+            .filter(|place| place.prediction.is_some())
+        {
             let off_m = off_m(&place.position);
             errors[0].push(off_m);
             errors[1].push(off_m / place.variance_m2.sqrt());
@@ -63,4 +68,23 @@ fn a_ball_of_sixty_contacts_is_round() {
     assert!(worst_m < 0.004, "{worst_m}");
     let claimed = root_mean_square(&in_deviations);
     assert!((0.1..1.5).contains(&claimed), "{claimed}");
+}
+
+#[test]
+fn boxes_of_sixty_contacts_are_named_by_a_walk() {
+    let library = taught(WAVES, 0..4, 60);
+    let verdict = |box_number| {
+        let mut recognition = Recognition::new(&Orientation::Known);
+        for contact in run_over(WAVES, box_number, 100) {
+            recognition.touch(&library, contact);
+        }
+        recognition.posterior(&library).verdict()
+    };
+    let own: Vec<Verdict> = (0..4).map(verdict).collect();
+    let others: Vec<Verdict> = (1000..1004).map(verdict).collect();
+    for (id, verdict) in (0..).zip(&own) {
+        assert_eq!(*verdict, Verdict::Object(ObjectId(id)), "{own:?}");
+    }
+    let named = |verdict: &Verdict| matches!(verdict, Verdict::Object(_));
+    assert!(!others.iter().any(named), "{others:?}");
 }

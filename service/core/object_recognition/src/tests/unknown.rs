@@ -49,7 +49,7 @@ fn sides_m(box_number: u64) -> [f64; 3] {
 pub(super) type LevelAt = fn(u64, &Point3<f64>) -> f64;
 
 /// Levels in waves over all faces: between contacts they follow from their neighbours.
-const WAVES: LevelAt = |box_number, point| {
+pub(super) const WAVES: LevelAt = |box_number, point| {
     let wave = |axis: u64| 100.0 * (uniform(910_000 + 8 * box_number + axis) - 0.5);
     let phase = wave(0) * point.x + wave(1) * point.y + wave(2) * point.z;
     (phase + 6.0 * uniform(920_000 + box_number)).sin()

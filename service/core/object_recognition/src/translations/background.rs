@@ -63,15 +63,22 @@ pub(crate) struct UnknownContact {
 }
 
 impl BackgroundModel {
-    /// Adds a contact: see [`unknown_contact`].
+    /// Adds a contact: see [`unknown_contact`]; `continued` is the log density of its position on a
+    /// surface that goes on as the contacts before tell.
     pub(crate) fn touch(
         &mut self,
         library: &ObjectLibrary,
         rotations: &[UnitQuaternion<f64>],
         pair: (&Contact, &Contact),
         drift_m2: f64,
+        continued: Option<f64>,
     ) -> UnknownContact {
-        let of_objects = unknown_contact(library, rotations, pair, drift_m2);
+        let mut of_objects = unknown_contact(library, rotations, pair, drift_m2);
+        if let Some(log) = continued {
+            for own in of_objects.values_mut() {
+                own.go_on(log);
+            }
+        }
         let (own, before) = (self.logs, self.logs_of_best());
         for (object, logs) in &of_objects {
             self.sums.entry(*object).or_default().add(logs);
@@ -156,7 +163,7 @@ mod tests {
             let levels = [k, k + 1].map(|k| f64::from(k * 5 % 13));
             let [before, now] = [contact(k, levels[0]), contact(k + 1, levels[1])];
             let log = background.logs.log();
-            let said = background.touch(&library, &none, (&before, &now), 0.0);
+            let said = background.touch(&library, &none, (&before, &now), 0.0, None);
             let most = said.of_objects.values();
             let most = most.flat_map(|logs| [logs.alike, logs.bare, logs.changing()]);
             let most = most.fold(f64::NEG_INFINITY, f64::max);

@@ -5,8 +5,12 @@ use pulp::Arch;
 
 use crate::index::packed_places::PackedPlaces;
 use crate::index::shortlist::Shortlist;
+use crate::indexed_model::IndexedModel;
+use crate::indexed_place::IndexedPlace;
 use crate::numeric::exp;
 use crate::percept_likelihood::{LANES, PerceptLikelihood};
+use crate::translations::shared_error::SharedError;
+use crate::translations::touch_update::TouchUpdate;
 
 /// A place that could be the one touched.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +21,8 @@ pub(crate) struct Candidate {
     pub(crate) apart: Vector3<f64>,
     /// Variance of a touch of it, per axis \[m²\].
     pub(crate) variance: f64,
+    /// How far an error of the translation shows in the offset.
+    pub(crate) shown: f64,
 }
 
 /// Buffers of a search, used again for every hypothesis.
@@ -53,6 +59,51 @@ impl CandidateSearch {
         total
     }
 
+    /// The place of which a touch predicted at `point` is most likely.
+    pub(crate) fn best<'a>(
+        &mut self,
+        indexed: &'a IndexedModel,
+        point: &Point3<f64>,
+        variance_m2: f64,
+        local: &PerceptLikelihood<'_>,
+    ) -> Option<&'a IndexedPlace> {
+        self.find(&indexed.packed, point, variance_m2, local);
+        let found = self.shortlist.found().iter().zip(&self.densities);
+        let (best, _) = found.max_by(|a, b| a.1.total_cmp(b.1))?;
+        Some(&indexed.places[indexed.packed.place(best.number as usize)])
+    }
+
+    /// Lists those that were found, after an earlier contact that told of the model's errors, and
+    /// returns the sum of their densities. The touch's variance per axis \[m²\] is that of the
+    /// translation and its noise.
+    pub(crate) fn conditioned(
+        &self,
+        indexed: &IndexedModel,
+        error: &SharedError,
+        (touch, [translation_m2, noise_m2]): (&TouchUpdate<'_>, [f64; 2]),
+        candidates: &mut Vec<Candidate>,
+    ) -> f64 {
+        candidates.clear();
+        let contact = touch.percepts.contact;
+        for (near, density) in self.shortlist.found().iter().zip(&self.densities) {
+            let place = &indexed.places[indexed.packed.place(near.number as usize)];
+            let own = error.condition(place);
+            let apart = self.shortlist.apart(near).cast() + own.offset;
+            let variance = noise_m2 + own.variance_m2;
+            let all = variance + own.shown * own.shown * translation_m2;
+            let before = f64::from(near.variance);
+            let fall = 0.5 * (f64::from(near.square) / before - apart.norm_squared() / all);
+            let ratio = error.level_ratio(place, contact, touch.level_prior);
+            candidates.push(Candidate {
+                density: density * fall.exp() * (before / all).powf(1.5) * ratio,
+                apart,
+                variance,
+                shown: own.shown,
+            });
+        }
+        candidates.iter().map(|own| own.density).sum()
+    }
+
     /// Lists those that were found with a density of `least` at least. `noise_m2` is the variance
     /// of the touch, per axis \[m²\].
     pub(crate) fn candidates(
@@ -70,6 +121,7 @@ impl CandidateSearch {
                     density: *density,
                     apart: self.shortlist.apart(near).cast(),
                     variance: noise_m2 + f64::from(own.variance_m2),
+                    shown: 1.0,
                 });
             }
         }

@@ -9,12 +9,13 @@ use crate::library::{ObjectId, ObjectLibrary};
 use crate::numeric::{log_sum, to_f32};
 use crate::percept_likelihood::ContactPercepts;
 use crate::translations::background::{BackgroundModel, UnknownContact};
+use crate::translations::continuation::continued_log;
 use crate::translations::hypothesis::TranslationHypothesis;
 use crate::translations::mass_histogram::MassHistogram;
 use crate::translations::merge::merged;
 use crate::translations::prefilter::{Prefilter, Seed};
 use crate::translations::split::SplitBuffers;
-use crate::translations::touch_update::TouchUpdate;
+use crate::translations::touch_update::{TouchUpdate, nearest_contact};
 use crate::translations::unexplored::Unexplored;
 use crate::tuning::{
     NEGLIGIBLE_SHARE, PREFILTER_CONTACTS_MAX, PROMOTION_MAX, PROMOTION_MIN, PROMOTION_SEEDS,
@@ -58,7 +59,8 @@ impl GaussianSum {
     /// Updates all hypotheses with a contact, and returns what it adds to the log-likelihood of the
     /// unknown object, if that predicts it; `before` are the earlier ones that are kept. `sizes`
     /// are the logs of the factors that the masses of each object have for its size, after the
-    /// contact, and `share` is that of one step of a walk, per that of a typical object.
+    /// contact, `share` is that of one step of a walk, per that of a typical object, and `reach_m` is
+    /// the radius within which a walk's next contact lies.
     ///
     /// All masses have these factors, so that the lightest hypotheses are those of the least
     /// probability: a large object explains each contact by more places than a small one.
@@ -69,6 +71,7 @@ impl GaussianSum {
         contact: &Contact,
         sizes: BTreeMap<ObjectId, f64>,
         share: &impl Fn(ObjectId) -> f64,
+        reach_m: Option<f64>,
     ) -> Option<f64> {
         let Some(last) = before.last() else {
             self.prefilter = Prefilter::new(library, &self.rotations, contact);
@@ -77,11 +80,11 @@ impl GaussianSum {
             return None;
         };
         self.resize(sizes);
-        let unknown = self.unknown(library, before, contact);
+        let unknown = self.unknown(library, (before, contact), reach_m);
         let densities =
             self.unexplored
                 .densities(library, (last, contact), unknown.as_ref(), share);
-        let touch = TouchUpdate::new(library, (last, contact), &densities);
+        let touch = TouchUpdate::new(library, (before, contact), &densities);
         let mut buffers = SplitBuffers::default();
         let mut parts = Vec::with_capacity(2 * self.all.len());
         let all = std::mem::take(&mut self.all);
@@ -128,19 +131,19 @@ impl GaussianSum {
     fn unknown(
         &mut self,
         library: &ObjectLibrary,
-        before: &[Contact],
-        contact: &Contact,
+        (before, contact): (&[Contact], &Contact),
+        reach_m: Option<f64>,
     ) -> Option<UnknownContact> {
-        let apart = |other: &&Contact| (contact.position_m - other.position_m).norm();
-        let nearest = before.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
-        let (nearest, last) = nearest.zip(before.last())?;
+        let (nearest, last) = nearest_contact(before, contact).zip(before.last())?;
         if contact.reached == Reached::Aimed {
             return None;
         }
         let drift_m2 = (contact.drift_sd_m.powi(2) - last.drift_sd_m.powi(2)).max(0.0);
+        let continued =
+            reach_m.and_then(|reach_m| continued_log(library, before, contact, reach_m));
         let pair = (nearest, contact);
         let background = &mut self.background;
-        Some(background.touch(library, &self.rotations, pair, drift_m2))
+        Some(background.touch(library, &self.rotations, pair, drift_m2, continued))
     }
 
     /// Updates the prefilter, and promotes the heaviest of the seeds that the touch supports: from
@@ -157,10 +160,11 @@ impl GaussianSum {
         let supported = prefilter.update(library, &self.rotations, touch);
         let promoted = promoted(&prefilter, &supported, before.len(), parts);
         let first = ContactPercepts::new(&before[0], library.level_prior());
-        let touches: Vec<TouchUpdate<'_>> = before
-            .windows(2)
+        let touches: Vec<TouchUpdate<'_>> = (1..before.len())
             .zip(&self.unexplored.history)
-            .map(|(two, unexplored)| TouchUpdate::new(library, (&two[0], &two[1]), unexplored))
+            .map(|(k, unexplored)| {
+                TouchUpdate::new(library, (&before[..k], &before[k]), unexplored)
+            })
             .collect();
         let touches: Vec<&TouchUpdate<'_>> = touches.iter().chain([touch]).collect();
         let mut replay = |prefilter: &mut Prefilter, seed: &Seed, parts: &mut Vec<_>| {

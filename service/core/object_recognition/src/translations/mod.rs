@@ -2,12 +2,14 @@
 
 mod background;
 mod candidates;
+mod continuation;
 mod gaussian_sum;
 mod hypothesis;
 mod mass_histogram;
 mod merge;
 mod prefilter;
 mod prefilter_group;
+mod shared_error;
 mod split;
 mod touch_update;
 mod unexplored;

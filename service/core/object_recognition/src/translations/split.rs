@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Point3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, UnitQuaternion};
 
 use crate::indexed_model::IndexedModel;
 use crate::library::ObjectLibrary;
@@ -10,6 +10,7 @@ use crate::numeric::to_f32;
 use crate::percept_likelihood::PerceptLikelihood;
 use crate::translations::candidates::{Candidate, CandidateSearch};
 use crate::translations::hypothesis::TranslationHypothesis;
+use crate::translations::shared_error::SharedError;
 use crate::translations::touch_update::{TouchUpdate, share};
 use crate::tuning::{SPLIT_MAX, SPLIT_SHARE_MIN};
 
@@ -17,6 +18,8 @@ use crate::tuning::{SPLIT_MAX, SPLIT_SHARE_MIN};
 #[derive(Debug, Default)]
 pub(crate) struct SplitBuffers {
     search: CandidateSearch,
+    /// The search about the nearest contact before.
+    earlier: CandidateSearch,
     candidates: Vec<Candidate>,
     now: Vec<TranslationHypothesis>,
     next: Vec<TranslationHypothesis>,
@@ -26,13 +29,15 @@ impl SplitBuffers {
     /// So many hypotheses of one model, rotation and touch follow.
     fn begin(&mut self, hypotheses: usize) {
         self.search.begin(hypotheses > 1);
+        self.earlier.begin(hypotheses > 1);
     }
 
     /// Appends the parts of a hypothesis after a touch, each with its place taken for the one
     /// touched.
     ///
     /// A hypothesis of an outlier keeps its translation. The others are conditioned on their place
-    /// by the Kalman gain g = P/(P + R), with the share of its density in the sum of all.
+    /// by the Kalman gain g = P h/(h² P + R), h being how far an error of the
+    /// translation shows in the offset, with the share of its density in the sum of all.
     fn split(
         &mut self,
         rotation: &UnitQuaternion<f64>,
@@ -47,7 +52,23 @@ impl SplitBuffers {
         let noise = contact.position_sd_m * contact.position_sd_m;
         let point = Point3::from(rotation * contact.position_m.coords + hypothesis.translation);
         let packed = &indexed.packed;
-        let densities = (self.search).find(packed, &point, prior + noise, local);
+        let mut densities = (self.search).find(packed, &point, prior + noise, local);
+        let shared = indexed.between_sd_m.and_then(|_| {
+            let pose = Isometry3::from_parts(hypothesis.translation.into(), *rotation);
+            let pair = (&touch.nearest, contact);
+            let search = &mut self.earlier;
+            SharedError::new(
+                search,
+                (indexed, &pose),
+                hypothesis,
+                pair,
+                touch.level_prior,
+            )
+        });
+        if let Some(error) = &shared {
+            let variances = (touch, [prior, noise]);
+            densities = (self.search).conditioned(indexed, error, variances, candidates);
+        }
         let one = share(indexed.places.len()) / TAU.powf(1.5);
         let unpredicted = touch.unpredicted(hypothesis.object, indexed, &point, one * densities);
         let beyond = unpredicted.map_or(0.0, |own| own.density);
@@ -61,7 +82,11 @@ impl SplitBuffers {
             }
         }
         let least = SPLIT_SHARE_MIN * total;
-        (self.search).candidates(packed, (least, noise), candidates);
+        if shared.is_some() {
+            candidates.retain(|candidate| candidate.density >= least);
+        } else {
+            (self.search).candidates(packed, (least, noise), candidates);
+        }
         if candidates.len() > SPLIT_MAX {
             candidates.sort_by(|a, b| b.density.total_cmp(&a.density));
             candidates.truncate(SPLIT_MAX);
@@ -84,12 +109,13 @@ impl SplitBuffers {
             density,
             apart,
             variance,
+            shown,
         } in candidates
         {
-            let gain = prior / (prior + *variance);
+            let gain = prior * *shown / (*shown * *shown * prior + *variance);
             parts.push(TranslationHypothesis {
                 translation: hypothesis.translation + gain * *apart,
-                variance_m2: prior - gain * prior,
+                variance_m2: prior - gain * *shown * prior,
                 evidence: evidence + (*density / sum).ln(),
                 falls,
                 ..*hypothesis

@@ -7,6 +7,7 @@ use nalgebra::Point3;
 use crate::contact::Contact;
 use crate::indexed_model::IndexedModel;
 use crate::interpolation::Part;
+use crate::level_prior::LevelPrior;
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::percept_likelihood::ContactPercepts;
 use crate::tuning::OUTLIER_SHARE;
@@ -15,6 +16,10 @@ use crate::tuning::OUTLIER_SHARE;
 #[derive(Debug)]
 pub(crate) struct TouchUpdate<'a> {
     pub(crate) percepts: ContactPercepts<'a>,
+    /// The nearest contact before.
+    pub(crate) nearest: ContactPercepts<'a>,
+    /// Distributions of levels over the library, by channel.
+    pub(crate) level_prior: &'a [LevelPrior],
     /// Variance of the drift of path integration since the touch before, per axis \[m²\].
     pub(crate) drift_m2: f64,
     /// Density of outliers times their share \[1/m³\].
@@ -42,14 +47,20 @@ pub(crate) struct Unpredicted {
 }
 
 impl<'a> TouchUpdate<'a> {
-    /// Of a contact and the one before it.
+    /// Of a contact, after these, of which there is one at least.
     pub(crate) fn new(
         library: &'a ObjectLibrary,
-        (last, contact): (&Contact, &'a Contact),
+        (before, contact): (&'a [Contact], &'a Contact),
         unexplored: &'a BTreeMap<ObjectId, UnpredictedDensity>,
     ) -> Self {
+        let level_prior = library.level_prior();
+        let (last, nearest) = { before.last() }
+            .zip(nearest_contact(before, contact))
+            .unwrap_or((contact, contact));
         Self {
-            percepts: ContactPercepts::new(contact, library.level_prior()),
+            percepts: ContactPercepts::new(contact, level_prior),
+            nearest: ContactPercepts::new(nearest, level_prior),
+            level_prior,
             drift_m2: (contact.drift_sd_m.powi(2) - last.drift_sd_m.powi(2)).max(0.0),
             outlier: OUTLIER_SHARE * library.clutter_per_m3(),
             unexplored,
@@ -85,6 +96,12 @@ impl<'a> TouchUpdate<'a> {
             is_gap: part == Part::Gap,
         })
     }
+}
+
+/// Of the contacts before another one, the nearest; none of none.
+pub(crate) fn nearest_contact<'a>(before: &'a [Contact], contact: &Contact) -> Option<&'a Contact> {
+    let apart = |other: &&Contact| (contact.position_m - other.position_m).norm();
+    before.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))
 }
 
 /// Prior probability that a touch is of a given one of so many places.

@@ -1,13 +1,14 @@
 //! Densities of one contact with an unknown object.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
+use std::f64::consts::{LN_2, TAU};
 
 use nalgebra::UnitQuaternion;
 
 use crate::contact::{Contact, LevelReading};
 use crate::indexed_place::IndexedPlace;
 use crate::library::{ObjectId, ObjectLibrary};
+use crate::numeric::log_sum;
 use crate::percept_likelihood::ContactPercepts;
 use crate::translations::candidates::CandidateSearch;
 use crate::tuning::{BACKGROUND_WEIGHT_MIN, OUTLIER_SHARE};
@@ -28,6 +29,14 @@ impl PerceptLogs {
     /// With levels that change, if there are any.
     pub(super) fn changing(&self) -> f64 {
         self.changing.unwrap_or(self.bare)
+    }
+
+    /// With levels that change, the surface goes on as that of the library or, as probably, as
+    /// the contacts before tell, by which the contact's position has this log density.
+    pub(super) fn go_on(&mut self, log: f64) {
+        let bare = self.bare;
+        let also = |changing: f64| log_sum([changing, log + changing - bare].into_iter()) - LN_2;
+        self.changing = self.changing.map(also);
     }
 
     /// Adds those of a further contact.
@@ -67,7 +76,7 @@ pub(super) fn unknown_contact(
     let objects = library.indexed_models().map(|(object, _)| object);
     let mut sums: BTreeMap<ObjectId, [Sums; 3]> =
         objects.map(|object| (object, Default::default())).collect();
-    let compares = { contact.levels.iter() }.any(|reading| level_of(other, reading).is_some());
+    let compares = { contact.levels.iter() }.any(|reading| other.level(reading.channel).is_some());
     let mut nearby = CandidateSearch::default();
     let mut turns = rotations.iter().cycle();
     for sample in library.samples() {
@@ -133,8 +142,8 @@ pub(super) fn unknown_contact(
 /// from the one before to it, and without what that does not tell.
 fn changed((before, now): (&Contact, &Contact), place: &IndexedPlace) -> Contact {
     let levels = now.levels.iter().filter_map(|reading| {
-        let before = level_of(before, reading)?;
-        let own = { place.levels.iter() }.find(|own| own.channel == reading.channel)?;
+        let before = before.level(reading.channel)?;
+        let own = place.level(reading.channel)?;
         let variance = own.variance() + before.sd * before.sd + reading.sd * reading.sd;
         Some(LevelReading {
             channel: reading.channel,
@@ -146,11 +155,6 @@ fn changed((before, now): (&Contact, &Contact), place: &IndexedPlace) -> Contact
         levels: levels.collect(),
         ..now.bare()
     }
-}
-
-/// The level of a contact on the channel of a reading.
-fn level_of<'a>(contact: &'a Contact, reading: &LevelReading) -> Option<&'a LevelReading> {
-    { contact.levels.iter() }.find(|own| own.channel == reading.channel)
 }
 
 /// Sums over places: weighted densities, weights, densities, and their number.

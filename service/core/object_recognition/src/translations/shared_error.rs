@@ -1,0 +1,224 @@
+//! Errors that contacts share: what is predicted between the places of a model errs alike nearby.
+
+use nalgebra::{Isometry3, Vector3};
+
+use crate::contact::{Contact, LevelReading};
+use crate::indexed_model::IndexedModel;
+use crate::indexed_place::IndexedPlace;
+use crate::level_prior::LevelPrior;
+use crate::percept_likelihood::ContactPercepts;
+use crate::translations::candidates::CandidateSearch;
+use crate::translations::hypothesis::TranslationHypothesis;
+use crate::tuning::{ERROR_REACH, SHARED_DEVIATIONS, SHARED_MIN};
+
+/// What an earlier contact tells of the error of a model's prediction.
+///
+/// The errors at two points of a gap are Gaussian with standard deviations s and s′ and correlation
+/// ρ = exp(−d²/4ℓ²). A contact with noise σ and residual r at the one leaves at the other a mean of
+/// s′ g r and a variance of s′² (1 − ρ g s), with g = ρ s/(s² + σ²): the conditional distribution,
+/// given the nearest contact alone (Vecchia 1988, Estimation and model identification for
+/// continuous spatial processes). An error of the hypothesis' translation is in both residuals, so
+/// that it shows by 1 − s′ g only.
+#[derive(Clone, Debug)]
+pub(crate) struct SharedError {
+    position: Told,
+    /// The residual across the surface \[m\].
+    offset: Vector3<f64>,
+    /// The same of levels, by channel, with the residual.
+    levels: Vec<(u16, Told, f64)>,
+}
+
+/// What a residual tells of another.
+#[derive(Clone, Copy, Debug)]
+struct Told {
+    /// Mean of the error per residual and its standard deviation: g.
+    gain: f64,
+    /// Share of the error's variance that is known: ρ g s.
+    known: f64,
+}
+
+/// A place as it is after an earlier contact.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Conditioned {
+    /// Offset of the place from where it was predicted \[m\].
+    pub(crate) offset: Vector3<f64>,
+    /// Variance of a touch of it, without the touch's noise, per axis \[m²\].
+    pub(crate) variance_m2: f64,
+    /// How far an error of the translation shows in the offset of a touch: 1 of a place that was
+    /// felt.
+    pub(crate) shown: f64,
+}
+
+impl Told {
+    fn new(correlation: f64, error: f64, noise: f64) -> Self {
+        let all = (error + noise).max(f64::MIN_POSITIVE);
+        Self {
+            gain: correlation * error.sqrt() / all,
+            known: correlation * correlation * error / all,
+        }
+    }
+}
+
+impl SharedError {
+    /// At the contact that is nearest to another one, as a hypothesis has it. None where it is with
+    /// a place that was felt, too far away, or not as the model predicts at all.
+    pub(crate) fn new(
+        search: &mut CandidateSearch,
+        (indexed, map_from_episode): (&IndexedModel, &Isometry3<f64>),
+        hypothesis: &TranslationHypothesis,
+        (nearest, contact): (&ContactPercepts<'_>, &Contact),
+        level_prior: &[LevelPrior],
+    ) -> Option<Self> {
+        let earlier = nearest.contact;
+        let square = (contact.position_m - earlier.position_m).norm_squared();
+        let reach_m = ERROR_REACH * indexed.gap_m;
+        let correlation = (-0.25 * square / (reach_m * reach_m).max(f64::MIN_POSITIVE)).exp();
+        if correlation < SHARED_MIN {
+            return None;
+        }
+        let noise_m2 = earlier.position_sd_m * earlier.position_sd_m;
+        let point = map_from_episode * earlier.position_m;
+        let local = nearest.at(indexed, &map_from_episode.rotation);
+        let variance_m2 = noise_m2 + hypothesis.variance_m2;
+        let place = search.best(indexed, &point, variance_m2, &local)?;
+        let prediction = place.prediction.as_ref()?;
+        let offset = prediction.across * (point - place.position);
+        let is_usual = |square: f64, variance: f64| square <= SHARED_DEVIATIONS.powi(2) * variance;
+        if !is_usual(offset.norm_squared(), prediction.error_m2 + variance_m2) {
+            return None;
+        }
+        let levels = earlier.levels.iter().filter_map(|reading: &LevelReading| {
+            let own = place.level(reading.channel)?;
+            let noise = LevelPrior::of(level_prior, reading.channel)?.noise(reading);
+            let residual = reading.value - own.mean;
+            let told = Told::new(correlation, own.variance(), noise);
+            is_usual(residual * residual, own.variance() + noise).then_some((
+                reading.channel,
+                told,
+                residual,
+            ))
+        });
+        Some(Self {
+            position: Told::new(correlation, prediction.error_m2, noise_m2),
+            offset,
+            levels: levels.collect(),
+        })
+    }
+
+    /// A place about the other contact.
+    pub(crate) fn condition(&self, place: &IndexedPlace) -> Conditioned {
+        let error_m2 = place.prediction.as_ref().map_or(0.0, |own| own.error_m2);
+        let gain = self.position.gain * error_m2.sqrt();
+        Conditioned {
+            offset: self.offset * gain,
+            variance_m2: place.variance_m2 - self.position.known * error_m2,
+            shown: (1.0 - gain).max(0.0),
+        }
+    }
+
+    /// Likelihood of the other contact's levels at a place, per that without the earlier contact.
+    pub(crate) fn level_ratio(
+        &self,
+        place: &IndexedPlace,
+        contact: &Contact,
+        level_prior: &[LevelPrior],
+    ) -> f64 {
+        if place.prediction.is_none() {
+            return 1.0;
+        }
+        let ratio = |(channel, told, residual): &(u16, Told, f64)| {
+            let own = place.level(*channel)?;
+            let reading = contact.level(*channel)?;
+            let prior = LevelPrior::of(level_prior, *channel)?;
+            let variance = own.variance();
+            let mean = own.mean + told.gain * variance.sqrt() * residual;
+            let now = prior.ratio(reading, mean, variance * (1.0 - told.known));
+            Some(now / prior.ratio(reading, own.mean, variance))
+        };
+        self.levels.iter().filter_map(ratio).product()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix2, Matrix3, Vector2};
+
+    use super::*;
+
+    /// The errors at both contacts and what one tells of the other, by the joint Gaussian of both.
+    #[test]
+    fn an_earlier_contact_tells_what_the_joint_distribution_says() {
+        for (error, noise, correlation, residual) in [
+            (4.0, 1.0, 0.9, 1.5),
+            (0.25, 4.0, 0.5, -3.0),
+            (1e-6, 1e-8, 0.999, 2e-3),
+            (9.0, 0.0, 0.3, 5.0),
+        ] {
+            let told = Told::new(correlation, error, noise);
+            for other in [0.5, 1.0, 7.0] {
+                let other = other * error;
+                let across = correlation * f64::sqrt(error * other);
+                let joint = Matrix2::new(error + noise, across, across, other);
+                let mean = joint[(1, 0)] / joint[(0, 0)] * residual;
+                let left = joint.determinant() / joint[(0, 0)];
+                let of_mean = told.gain * other.sqrt() * residual;
+                assert!((of_mean - mean).abs() <= 1e-9 * mean.abs());
+                assert!((other * (1.0 - told.known) - left).abs() <= 1e-9 * other);
+            }
+        }
+    }
+
+    /// An error of the translation is in both residuals: what one contact tells of the next takes
+    /// its part of it away. The oracle is the posterior of the translation by both contacts at once.
+    #[test]
+    fn a_translation_is_not_learned_twice_from_one_error() {
+        let [prior, error, noise, correlation]: [f64; 4] = [25.0, 9.0, 1.0, 0.8];
+        let residuals = Vector2::new(3.0, 4.0);
+        let own = error + noise;
+        let common = correlation * error;
+        let information = Matrix2::new(own, common, common, own).try_inverse();
+        let information = information.expect("positive definite");
+        let seen = Vector2::repeat(1.0);
+        let precision = 1.0 / prior + seen.dot(&(information * seen));
+        let mean = seen.dot(&(information * residuals)) / precision;
+
+        let step = |[mean, prior]: [f64; 2], residual: f64, shown: f64, variance: f64| {
+            let gain = prior * shown / (shown * shown * prior + variance);
+            let mean = mean + gain * (residual - shown * mean);
+            [mean, prior - gain * shown * prior]
+        };
+        let first = step([0.0, prior], residuals[0], 1.0, own);
+        let told = Told::new(correlation, error, noise);
+        let gain = told.gain * error.sqrt();
+        let left = error * (1.0 - told.known) + noise;
+        let both = step(first, residuals[1] - gain * residuals[0], 1.0 - gain, left);
+        assert!((both[0] - mean).abs() < 1e-9, "{both:?} {mean}");
+        assert!((both[1] - 1.0 / precision).abs() < 1e-9, "{both:?}");
+    }
+
+    #[test]
+    fn a_place_that_was_felt_keeps_what_it_is() {
+        let place = |error_m2: Option<f64>| IndexedPlace {
+            position: nalgebra::Point3::origin(),
+            normal: None,
+            variance_m2: 4e-6,
+            prediction: error_m2.map(|error_m2| crate::indexed_place::Prediction {
+                error_m2,
+                across: Matrix3::from_diagonal(&Vector3::z()),
+            }),
+            levels: Vec::new(),
+            descriptors: Vec::new(),
+        };
+        let error = SharedError {
+            position: Told::new(1.0, 3e-6, 1e-6),
+            offset: Vector3::z() * 2e-3,
+            levels: Vec::new(),
+        };
+        let felt = error.condition(&place(None));
+        assert_eq!(felt.offset, Vector3::zeros());
+        assert_eq!((felt.variance_m2, felt.shown), (4e-6, 1.0));
+        let predicted = error.condition(&place(Some(3e-6)));
+        assert!((predicted.offset.z - 1.5e-3).abs() < 1e-12, "{predicted:?}");
+        assert!(predicted.variance_m2 < 2e-6 && predicted.shown < 0.3);
+    }
+}
