@@ -27,6 +27,8 @@ pub(crate) struct IndexedModel {
     pub(crate) area_m2: f64,
     /// Typical distance between neighbouring places that were felt \[m\].
     pub(crate) gap_m: f64,
+    /// Distance within which contacts are of one place \[m\].
+    pub(crate) spacing_m: f64,
     /// Whether its places lie along lines.
     pub(crate) is_curve: bool,
     /// Standard deviation of what was predicted between the places \[m\]; none where nothing was.
@@ -101,6 +103,7 @@ impl IndexedModel {
             surfel_map: SurfelMap::new(model),
             extent_m,
             gap_m: graph.typical_m,
+            spacing_m,
             is_curve: graph.is_curve(),
             between_sd_m: between_sd_m(&places),
             missed_share: (spread == Spread::OnPlaces).then(|| missed_share(model.places())),

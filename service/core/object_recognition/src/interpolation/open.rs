@@ -91,7 +91,7 @@ impl OpenRegion {
         if !is_open_anywhere && !has_nodes && spread == Spread::Even {
             return None;
         }
-        // A gap begins beyond the field of a place, which is as wide as two nodes are apart at most.
+        // A gap begins beyond the field of a place, at most as wide as two nodes are apart.
         let gap_m2 = |own: usize| {
             if spread == Spread::OnPlaces {
                 return (0.5 * spacing_m).powi(2);

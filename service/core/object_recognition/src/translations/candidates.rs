@@ -1,6 +1,6 @@
 //! Candidates: the places that a touch could be of, given where a hypothesis predicts it.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use pulp::Arch;
 
 use crate::index::packed_places::PackedPlaces;
@@ -10,7 +10,6 @@ use crate::indexed_place::IndexedPlace;
 use crate::numeric::exp;
 use crate::percept_likelihood::{LANES, PerceptLikelihood};
 use crate::translations::shared_error::SharedError;
-use crate::translations::touch_update::TouchUpdate;
 
 /// A place that could be the one touched.
 #[derive(Clone, Copy, Debug)]
@@ -21,8 +20,28 @@ pub(crate) struct Candidate {
     pub(crate) apart: Vector3<f64>,
     /// Variance of a touch of it, per axis \[m²\].
     pub(crate) variance: f64,
-    /// How far an error of the translation shows in the offset.
-    pub(crate) shown: f64,
+    /// What is across the surface, and how far an error of the translation shows in the offset
+    /// there; none where it shows everywhere.
+    pub(crate) across: Option<(Matrix3<f64>, f64)>,
+}
+
+impl Candidate {
+    /// The translation's error and its variance per axis after the touch, if this is the place, by
+    /// the Kalman gain P h/(h² P + R): h is how far an error of the translation shows in the offset.
+    /// The variance is the mean over the axes.
+    pub(crate) fn update(&self, prior_m2: f64) -> (Vector3<f64>, f64) {
+        let gain = |shown: f64| prior_m2 * shown / (shown * shown * prior_m2 + self.variance);
+        let along = gain(1.0);
+        let Some((across, shown)) = &self.across else {
+            return (self.apart * along, prior_m2 - along * prior_m2);
+        };
+        let gained = gain(*shown);
+        let offset = across * self.apart;
+        let dimensions = across.trace();
+        let told = dimensions * gained * shown + (3.0 - dimensions) * along;
+        let moved = offset * gained + (self.apart - offset) * along;
+        (moved, prior_m2 - told / 3.0 * prior_m2)
+    }
 }
 
 /// Buffers of a search, used again for every hypothesis.
@@ -59,47 +78,58 @@ impl CandidateSearch {
         total
     }
 
-    /// The place of which a touch predicted at `point` is most likely.
+    /// The place of which a touch predicted at `point` is most likely, if its density there is
+    /// `least` or more.
     pub(crate) fn best<'a>(
         &mut self,
         indexed: &'a IndexedModel,
         point: &Point3<f64>,
         variance_m2: f64,
-        local: &PerceptLikelihood<'_>,
+        (local, least): (&PerceptLikelihood<'_>, f64),
     ) -> Option<&'a IndexedPlace> {
         self.find(&indexed.packed, point, variance_m2, local);
         let found = self.shortlist.found().iter().zip(&self.densities);
-        let (best, _) = found.max_by(|a, b| a.1.total_cmp(b.1))?;
-        Some(&indexed.places[indexed.packed.place(best.number as usize)])
+        let (best, density) = found.max_by(|a, b| a.1.total_cmp(b.1))?;
+        let place = || &indexed.places[indexed.packed.place(best.number as usize)];
+        (*density >= least).then(place)
     }
 
     /// Lists those that were found, after an earlier contact that told of the model's errors, and
-    /// returns the sum of their densities. The touch's variance per axis \[m²\] is that of the
-    /// translation and its noise.
+    /// returns the sum of their densities. The variances per axis \[m²\] are those of the translation
+    /// and of the touch's noise.
     pub(crate) fn conditioned(
         &self,
         indexed: &IndexedModel,
         error: &SharedError,
-        (touch, [translation_m2, noise_m2]): (&TouchUpdate<'_>, [f64; 2]),
+        [translation_m2, noise_m2]: [f64; 2],
         candidates: &mut Vec<Candidate>,
     ) -> f64 {
         candidates.clear();
-        let contact = touch.percepts.contact;
         for (near, density) in self.shortlist.found().iter().zip(&self.densities) {
             let place = &indexed.places[indexed.packed.place(near.number as usize)];
             let own = error.condition(place);
-            let apart = self.shortlist.apart(near).cast() + own.offset;
-            let variance = noise_m2 + own.variance_m2;
-            let all = variance + own.shown * own.shown * translation_m2;
-            let before = f64::from(near.variance);
-            let fall = 0.5 * (f64::from(near.square) / before - apart.norm_squared() / all);
-            let ratio = error.level_ratio(place, contact, touch.level_prior);
-            candidates.push(Candidate {
-                density: density * fall.exp() * (before / all).powf(1.5) * ratio,
+            let apart: Vector3<f64> = self.shortlist.apart(near).cast() + own.offset;
+            let mut candidate = Candidate {
+                density: density * own.level_ratio,
                 apart,
-                variance,
-                shown: own.shown,
-            });
+                variance: noise_m2 + own.variance_m2,
+                across: None,
+            };
+            if let Some(prediction) = &place.prediction {
+                candidate.across = Some((prediction.across, own.shown));
+                let across = prediction.across * apart;
+                let dimensions = prediction.across.trace();
+                let [along_m2, across_m2] = [1.0, own.shown * own.shown]
+                    .map(|shown| candidate.variance + shown * translation_m2);
+                let before_m2 = f64::from(near.variance);
+                let fall = f64::from(near.square) / before_m2
+                    - across.norm_squared() / across_m2
+                    - (apart - across).norm_squared() / along_m2;
+                let widths = dimensions * (before_m2 / across_m2).ln()
+                    + (3.0 - dimensions) * (before_m2 / along_m2).ln();
+                candidate.density *= (0.5 * (fall + widths)).exp();
+            }
+            candidates.push(candidate);
         }
         candidates.iter().map(|own| own.density).sum()
     }
@@ -121,7 +151,7 @@ impl CandidateSearch {
                     density: *density,
                     apart: self.shortlist.apart(near).cast(),
                     variance: noise_m2 + f64::from(own.variance_m2),
-                    shown: 1.0,
+                    across: None,
                 });
             }
         }

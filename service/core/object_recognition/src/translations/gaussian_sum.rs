@@ -59,8 +59,8 @@ impl GaussianSum {
     /// Updates all hypotheses with a contact, and returns what it adds to the log-likelihood of the
     /// unknown object, if that predicts it; `before` are the earlier ones that are kept. `sizes`
     /// are the logs of the factors that the masses of each object have for its size, after the
-    /// contact, `share` is that of one step of a walk, per that of a typical object, and `reach_m` is
-    /// the radius within which a walk's next contact lies.
+    /// contact, `share` is that of one step of a walk, per that of a typical object, and `reach_m`
+    /// is the radius within which a walk's next contact lies.
     ///
     /// All masses have these factors, so that the lightest hypotheses are those of the least
     /// probability: a large object explains each contact by more places than a small one.

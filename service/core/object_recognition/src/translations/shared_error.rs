@@ -1,15 +1,15 @@
 //! Errors that contacts share: what is predicted between the places of a model errs alike nearby.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use crate::contact::{Contact, LevelReading};
+use crate::contact::LevelReading;
 use crate::indexed_model::IndexedModel;
 use crate::indexed_place::IndexedPlace;
 use crate::level_prior::LevelPrior;
-use crate::percept_likelihood::ContactPercepts;
 use crate::translations::candidates::CandidateSearch;
 use crate::translations::hypothesis::TranslationHypothesis;
-use crate::tuning::{ERROR_REACH, SHARED_DEVIATIONS, SHARED_MIN};
+use crate::translations::touch_update::TouchUpdate;
+use crate::tuning::{ERROR_REACH, SHARED_DEVIATIONS, SHARED_MIN, WRONG_PERCEPT_SHARE};
 
 /// What an earlier contact tells of the error of a model's prediction.
 ///
@@ -24,8 +24,9 @@ pub(crate) struct SharedError {
     position: Told,
     /// The residual across the surface \[m\].
     offset: Vector3<f64>,
-    /// The same of levels, by channel, with the residual.
-    levels: Vec<(u16, Told, f64)>,
+    /// Projects an offset on what is across the surface there.
+    across: Matrix3<f64>,
+    levels: Vec<SharedLevel>,
 }
 
 /// What a residual tells of another.
@@ -37,6 +38,18 @@ struct Told {
     known: f64,
 }
 
+/// The same of a level.
+#[derive(Clone, Copy, Debug)]
+struct SharedLevel {
+    channel: u16,
+    told: Told,
+    residual: f64,
+    /// The other contact's level, the variance of its noise, and its density anywhere times √(2π).
+    value: f64,
+    noise: f64,
+    density: f64,
+}
+
 /// A place as it is after an earlier contact.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Conditioned {
@@ -44,9 +57,10 @@ pub(crate) struct Conditioned {
     pub(crate) offset: Vector3<f64>,
     /// Variance of a touch of it, without the touch's noise, per axis \[m²\].
     pub(crate) variance_m2: f64,
-    /// How far an error of the translation shows in the offset of a touch: 1 of a place that was
-    /// felt.
+    /// How far an error of the translation shows across the surface in the offset of a touch.
     pub(crate) shown: f64,
+    /// Likelihood of the touch's levels, per that without the earlier contact.
+    pub(crate) level_ratio: f64,
 }
 
 impl Told {
@@ -60,27 +74,29 @@ impl Told {
 }
 
 impl SharedError {
-    /// At the contact that is nearest to another one, as a hypothesis has it. None where it is with
-    /// a place that was felt, too far away, or not as the model predicts at all.
+    /// At the contact that is nearest to a touch, as a hypothesis has it; `least` is the density
+    /// that an outlier has there. None where that contact is with a place that was felt, too far
+    /// away, or not as the model predicts at all.
     pub(crate) fn new(
         search: &mut CandidateSearch,
         (indexed, map_from_episode): (&IndexedModel, &Isometry3<f64>),
         hypothesis: &TranslationHypothesis,
-        (nearest, contact): (&ContactPercepts<'_>, &Contact),
-        level_prior: &[LevelPrior],
+        touch: &TouchUpdate<'_>,
+        least: f64,
     ) -> Option<Self> {
-        let earlier = nearest.contact;
+        let (earlier, contact) = (touch.nearest.contact, touch.percepts.contact);
         let square = (contact.position_m - earlier.position_m).norm_squared();
         let reach_m = ERROR_REACH * indexed.gap_m;
         let correlation = (-0.25 * square / (reach_m * reach_m).max(f64::MIN_POSITIVE)).exp();
         if correlation < SHARED_MIN {
             return None;
         }
-        let noise_m2 = earlier.position_sd_m * earlier.position_sd_m;
+        let drift_m2 = contact.drift_sd_m.powi(2) - earlier.drift_sd_m.powi(2);
+        let noise_m2 = earlier.position_sd_m.powi(2) + drift_m2.max(0.0);
         let point = map_from_episode * earlier.position_m;
-        let local = nearest.at(indexed, &map_from_episode.rotation);
+        let local = touch.nearest.at(indexed, &map_from_episode.rotation);
         let variance_m2 = noise_m2 + hypothesis.variance_m2;
-        let place = search.best(indexed, &point, variance_m2, &local)?;
+        let place = search.best(indexed, &point, variance_m2, (&local, least))?;
         let prediction = place.prediction.as_ref()?;
         let offset = prediction.across * (point - place.position);
         let is_usual = |square: f64, variance: f64| square <= SHARED_DEVIATIONS.powi(2) * variance;
@@ -88,60 +104,71 @@ impl SharedError {
             return None;
         }
         let levels = earlier.levels.iter().filter_map(|reading: &LevelReading| {
-            let own = place.level(reading.channel)?;
-            let noise = LevelPrior::of(level_prior, reading.channel)?.noise(reading);
+            let channel = reading.channel;
+            let (own, now) = (place.level(channel)?, contact.level(channel)?);
+            let prior = LevelPrior::of(touch.level_prior, channel)?;
             let residual = reading.value - own.mean;
-            let told = Told::new(correlation, own.variance(), noise);
-            is_usual(residual * residual, own.variance() + noise).then_some((
-                reading.channel,
-                told,
+            let noise = prior.noise(reading);
+            is_usual(residual * residual, own.variance() + noise).then(|| SharedLevel {
+                channel,
+                told: Told::new(correlation, own.variance(), noise),
                 residual,
-            ))
+                value: now.value,
+                noise: prior.noise(now),
+                density: prior.density(now),
+            })
         });
         Some(Self {
             position: Told::new(correlation, prediction.error_m2, noise_m2),
             offset,
+            across: prediction.across,
             levels: levels.collect(),
         })
     }
 
-    /// A place about the other contact.
+    /// A place about the touch; of one that was felt nothing changes. Errors are shared as far as
+    /// both surfaces have the same normal.
     pub(crate) fn condition(&self, place: &IndexedPlace) -> Conditioned {
-        let error_m2 = place.prediction.as_ref().map_or(0.0, |own| own.error_m2);
-        let gain = self.position.gain * error_m2.sqrt();
+        let Some(prediction) = &place.prediction else {
+            return Conditioned {
+                offset: Vector3::zeros(),
+                variance_m2: place.variance_m2,
+                shown: 1.0,
+                level_ratio: 1.0,
+            };
+        };
+        let dimensions = self.across.trace().max(1.0);
+        let alike = ((self.across * prediction.across).trace() / dimensions).clamp(0.0, 1.0);
+        let gain = alike * self.position.gain * prediction.error_m2.sqrt();
+        let known = alike * alike * self.position.known;
+        let ratios = self.levels.iter().filter_map(|own| own.ratio(place));
         Conditioned {
-            offset: self.offset * gain,
-            variance_m2: place.variance_m2 - self.position.known * error_m2,
-            shown: (1.0 - gain).max(0.0),
+            offset: prediction.across * self.offset * gain,
+            variance_m2: place.variance_m2 - known * prediction.error_m2,
+            shown: 1.0 - gain,
+            level_ratio: ratios.product(),
         }
     }
+}
 
-    /// Likelihood of the other contact's levels at a place, per that without the earlier contact.
-    pub(crate) fn level_ratio(
-        &self,
-        place: &IndexedPlace,
-        contact: &Contact,
-        level_prior: &[LevelPrior],
-    ) -> f64 {
-        if place.prediction.is_none() {
-            return 1.0;
-        }
-        let ratio = |(channel, told, residual): &(u16, Told, f64)| {
-            let own = place.level(*channel)?;
-            let reading = contact.level(*channel)?;
-            let prior = LevelPrior::of(level_prior, *channel)?;
-            let variance = own.variance();
-            let mean = own.mean + told.gain * variance.sqrt() * residual;
-            let now = prior.ratio(reading, mean, variance * (1.0 - told.known));
-            Some(now / prior.ratio(reading, own.mean, variance))
+impl SharedLevel {
+    fn ratio(&self, place: &IndexedPlace) -> Option<f64> {
+        let own = place.level(self.channel)?;
+        let variance = own.variance();
+        let likelihood = |mean: f64, variance: f64| {
+            let all = variance + self.noise;
+            let here = (-0.5 * (self.value - mean).powi(2) / all).exp() / all.sqrt();
+            (1.0 - WRONG_PERCEPT_SHARE) * here / self.density + WRONG_PERCEPT_SHARE
         };
-        self.levels.iter().filter_map(ratio).product()
+        let mean = own.mean + self.told.gain * variance.sqrt() * self.residual;
+        let now = likelihood(mean, variance * (1.0 - self.told.known));
+        Some(now / likelihood(own.mean, variance))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix2, Matrix3, Vector2};
+    use nalgebra::{Matrix2, Vector2};
 
     use super::*;
 
@@ -169,14 +196,19 @@ mod tests {
     }
 
     /// An error of the translation is in both residuals: what one contact tells of the next takes
-    /// its part of it away. The oracle is the posterior of the translation by both contacts at once.
+    /// its part of it away. The oracle is the posterior of the translation by both at once.
     #[test]
     fn a_translation_is_not_learned_twice_from_one_error() {
-        let [prior, error, noise, correlation]: [f64; 4] = [25.0, 9.0, 1.0, 0.8];
+        for other in [0.5, 9.0, 90.0] {
+            learned_once([25.0, 9.0, other, 1.0, 0.8]);
+        }
+    }
+
+    fn learned_once([prior, error, other, noise, correlation]: [f64; 5]) {
         let residuals = Vector2::new(3.0, 4.0);
-        let own = error + noise;
-        let common = correlation * error;
-        let information = Matrix2::new(own, common, common, own).try_inverse();
+        let (own, next) = (error + noise, other + noise);
+        let common = correlation * f64::sqrt(error * other);
+        let information = Matrix2::new(own, common, common, next).try_inverse();
         let information = information.expect("positive definite");
         let seen = Vector2::repeat(1.0);
         let precision = 1.0 / prior + seen.dot(&(information * seen));
@@ -189,8 +221,8 @@ mod tests {
         };
         let first = step([0.0, prior], residuals[0], 1.0, own);
         let told = Told::new(correlation, error, noise);
-        let gain = told.gain * error.sqrt();
-        let left = error * (1.0 - told.known) + noise;
+        let gain = told.gain * other.sqrt();
+        let left = other * (1.0 - told.known) + noise;
         let both = step(first, residuals[1] - gain * residuals[0], 1.0 - gain, left);
         assert!((both[0] - mean).abs() < 1e-9, "{both:?} {mean}");
         assert!((both[1] - 1.0 / precision).abs() < 1e-9, "{both:?}");
@@ -198,13 +230,13 @@ mod tests {
 
     #[test]
     fn a_place_that_was_felt_keeps_what_it_is() {
-        let place = |error_m2: Option<f64>| IndexedPlace {
+        let place = |error_m2: Option<f64>, normal: Vector3<f64>| IndexedPlace {
             position: nalgebra::Point3::origin(),
             normal: None,
             variance_m2: 4e-6,
             prediction: error_m2.map(|error_m2| crate::indexed_place::Prediction {
                 error_m2,
-                across: Matrix3::from_diagonal(&Vector3::z()),
+                across: Matrix3::from_diagonal(&normal),
             }),
             levels: Vec::new(),
             descriptors: Vec::new(),
@@ -212,13 +244,18 @@ mod tests {
         let error = SharedError {
             position: Told::new(1.0, 3e-6, 1e-6),
             offset: Vector3::z() * 2e-3,
+            across: Matrix3::from_diagonal(&Vector3::z()),
             levels: Vec::new(),
         };
-        let felt = error.condition(&place(None));
+        let felt = error.condition(&place(None, Vector3::z()));
         assert_eq!(felt.offset, Vector3::zeros());
         assert_eq!((felt.variance_m2, felt.shown), (4e-6, 1.0));
-        let predicted = error.condition(&place(Some(3e-6)));
+        let predicted = error.condition(&place(Some(3e-6), Vector3::z()));
         assert!((predicted.offset.z - 1.5e-3).abs() < 1e-12, "{predicted:?}");
         assert!(predicted.variance_m2 < 2e-6 && predicted.shown < 0.3);
+        // Round a corner the error is another one.
+        let aside = error.condition(&place(Some(3e-6), Vector3::x()));
+        assert_eq!(aside.offset, Vector3::zeros());
+        assert_eq!((aside.variance_m2, aside.shown), (4e-6, 1.0));
     }
 }

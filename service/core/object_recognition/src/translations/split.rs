@@ -53,23 +53,24 @@ impl SplitBuffers {
         let point = Point3::from(rotation * contact.position_m.coords + hypothesis.translation);
         let packed = &indexed.packed;
         let mut densities = (self.search).find(packed, &point, prior + noise, local);
-        let shared = indexed.between_sd_m.and_then(|_| {
-            let pose = Isometry3::from_parts(hypothesis.translation.into(), *rotation);
-            let pair = (&touch.nearest, contact);
-            let search = &mut self.earlier;
-            SharedError::new(
-                search,
-                (indexed, &pose),
-                hypothesis,
-                pair,
-                touch.level_prior,
-            )
-        });
-        if let Some(error) = &shared {
-            let variances = (touch, [prior, noise]);
-            densities = (self.search).conditioned(indexed, error, variances, candidates);
-        }
         let one = share(indexed.places.len()) / TAU.powf(1.5);
+        let shared = indexed
+            .between_sd_m
+            .filter(|_| densities > 0.0)
+            .and_then(|_| {
+                let pose = Isometry3::from_parts(hypothesis.translation.into(), *rotation);
+                let least = touch.outlier / one;
+                SharedError::new(
+                    &mut self.earlier,
+                    (indexed, &pose),
+                    hypothesis,
+                    touch,
+                    least,
+                )
+            });
+        if let Some(error) = &shared {
+            densities = (self.search).conditioned(indexed, error, [prior, noise], candidates);
+        }
         let unpredicted = touch.unpredicted(hypothesis.object, indexed, &point, one * densities);
         let beyond = unpredicted.map_or(0.0, |own| own.density);
         let outlier = (touch.outlier + beyond) / one;
@@ -105,18 +106,12 @@ impl SplitBuffers {
         let sum = { candidates.iter() }
             .map(|candidate| candidate.density)
             .sum::<f64>();
-        for Candidate {
-            density,
-            apart,
-            variance,
-            shown,
-        } in candidates
-        {
-            let gain = prior * *shown / (*shown * *shown * prior + *variance);
+        for candidate in candidates {
+            let (moved, variance_m2) = candidate.update(prior);
             parts.push(TranslationHypothesis {
-                translation: hypothesis.translation + gain * *apart,
-                variance_m2: prior - gain * *shown * prior,
-                evidence: evidence + (*density / sum).ln(),
+                translation: hypothesis.translation + moved,
+                variance_m2,
+                evidence: evidence + (candidate.density / sum).ln(),
                 falls,
                 ..*hypothesis
             });

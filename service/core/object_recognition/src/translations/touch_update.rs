@@ -98,10 +98,11 @@ impl<'a> TouchUpdate<'a> {
     }
 }
 
-/// Of the contacts before another one, the nearest; none of none.
+/// Of the contacts before another one, the nearest, and of equal ones the last; none of none.
 pub(crate) fn nearest_contact<'a>(before: &'a [Contact], contact: &Contact) -> Option<&'a Contact> {
     let apart = |other: &&Contact| (contact.position_m - other.position_m).norm();
-    before.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))
+    let newest_first = before.iter().rev();
+    newest_first.min_by(|a, b| apart(a).total_cmp(&apart(b)))
 }
 
 /// Prior probability that a touch is of a given one of so many places.
