@@ -109,6 +109,9 @@ pub(crate) const OPEN_CURVE_COS: f64 = -0.25;
 pub(crate) const FLAT_SHARE: f64 = 0.02;
 /// Least correlation of the errors at two contacts by which the one tells of the other. Chosen.
 pub(crate) const SHARED_MIN: f64 = 0.05;
+/// Least density of a place, per that of the likeliest, that an earlier contact may make likely: of
+/// what is within three deviations both of place and of level it is e⁻⁹. Derived.
+pub(crate) const CONDITIONED_MIN: f64 = 1e-4;
 /// Deviations from what is predicted beyond which a contact tells nothing of these errors: it is
 /// with something else. Chosen.
 pub(crate) const SHARED_DEVIATIONS: f64 = 3.0;
@@ -197,7 +200,7 @@ pub(crate) const DENSE_LINK: f64 = 1.5;
 /// A contact is in a gap of which nothing is predicted if it is farther from every place than half
 /// a spacing and so many of its deviations. Chosen.
 pub(crate) const UNPREDICTED_DEVIATIONS: f64 = 2.0;
-/// Odds of the unknown object over one that has such gaps, below which these do not take its lead:
+/// Odds of the unknown object over a known one, below which contacts in gaps do not take its lead:
 /// it comes first still, but a space that asks for more is not answered. Chosen.
 pub(crate) const UNPREDICTED_ODDS: f64 = 2.0;
 /// Distance of nodes, in spacings. Chosen.

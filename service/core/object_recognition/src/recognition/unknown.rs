@@ -101,7 +101,8 @@ impl Recognition {
     /// Contacts in one gap of a model share its errors. So the lead of an unknown object, or of the
     /// known one over what the library predicts, counts as that of fewer contacts. The lead of the
     /// known one over levels that are predicted from the contacts before counts in full: of an
-    /// error that contacts share, those before told.
+    /// error that contacts share, those before told. An unknown object that leads by all contacts
+    /// keeps the odds of [`doubt`], by which it comes first and nothing is answered.
     ///
     /// Of an object whose contacts fell on places alone, what [`told_by_gaps`] adds to a lead takes
     /// an answer away, but calls nothing unknown: at a place that was missed a known object is

@@ -10,6 +10,7 @@ use crate::indexed_place::IndexedPlace;
 use crate::numeric::exp;
 use crate::percept_likelihood::{LANES, PerceptLikelihood};
 use crate::translations::shared_error::SharedError;
+use crate::tuning::CONDITIONED_MIN;
 
 /// A place that could be the one touched.
 #[derive(Clone, Copy, Debug)]
@@ -27,8 +28,8 @@ pub(crate) struct Candidate {
 
 impl Candidate {
     /// The translation's error and its variance per axis after the touch, if this is the place, by
-    /// the Kalman gain P h/(h² P + R): h is how far an error of the translation shows in the offset.
-    /// The variance is the mean over the axes.
+    /// the Kalman gain P h/(h² P + R): h is how far an error of the translation shows in the
+    /// offset. The variance is the mean over the axes.
     pub(crate) fn update(&self, prior_m2: f64) -> (Vector3<f64>, f64) {
         let gain = |shown: f64| prior_m2 * shown / (shown * shown * prior_m2 + self.variance);
         let along = gain(1.0);
@@ -95,8 +96,8 @@ impl CandidateSearch {
     }
 
     /// Lists those that were found, after an earlier contact that told of the model's errors, and
-    /// returns the sum of their densities. The variances per axis \[m²\] are those of the translation
-    /// and of the touch's noise.
+    /// returns the sum of their densities. The variances per axis \[m²\] are those of the
+    /// translation and of the touch's noise.
     pub(crate) fn conditioned(
         &self,
         indexed: &IndexedModel,
@@ -105,7 +106,9 @@ impl CandidateSearch {
         candidates: &mut Vec<Candidate>,
     ) -> f64 {
         candidates.clear();
-        for (near, density) in self.shortlist.found().iter().zip(&self.densities) {
+        let least = CONDITIONED_MIN * self.densities.iter().copied().fold(0.0, f64::max);
+        let found = self.shortlist.found().iter().zip(&self.densities);
+        for (near, density) in found.filter(|(_, density)| **density >= least) {
             let place = &indexed.places[indexed.packed.place(near.number as usize)];
             let own = error.condition(place);
             let apart: Vector3<f64> = self.shortlist.apart(near).cast() + own.offset;

@@ -55,6 +55,7 @@ pub(super) fn continued_log(
 
 /// Lengths that are typical of a walk and of the objects of a library \[m\].
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::struct_field_names, reason = "their unit")]
 struct Sizes {
     reach_m: f64,
     extent_m: f64,

@@ -36,8 +36,7 @@ impl SplitBuffers {
     /// touched.
     ///
     /// A hypothesis of an outlier keeps its translation. The others are conditioned on their place
-    /// by the Kalman gain g = P h/(h² P + R), h being how far an error of the
-    /// translation shows in the offset, with the share of its density in the sum of all.
+    /// ([`Candidate::update`]), with the share of its density in the sum of all.
     fn split(
         &mut self,
         rotation: &UnitQuaternion<f64>,
