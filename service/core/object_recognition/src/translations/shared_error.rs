@@ -1,13 +1,11 @@
 //! Errors that contacts share: what is predicted between the places of a model errs alike nearby.
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::contact::LevelReading;
 use crate::indexed_model::IndexedModel;
 use crate::indexed_place::IndexedPlace;
 use crate::level_prior::LevelPrior;
-use crate::translations::candidates::CandidateSearch;
-use crate::translations::hypothesis::TranslationHypothesis;
 use crate::translations::touch_update::TouchUpdate;
 use crate::tuning::{ERROR_REACH, SHARED_DEVIATIONS, SHARED_MIN, WRONG_PERCEPT_SHARE};
 
@@ -74,29 +72,33 @@ impl Told {
 }
 
 impl SharedError {
-    /// At the contact that is nearest to a touch, as a hypothesis has it; `least` is the density
-    /// that an outlier has there. None where that contact is with a place that was felt, too far
-    /// away, or not as the model predicts at all.
+    /// Correlation of the errors at a touch and at the nearest contact before; none where they have
+    /// hardly any.
+    pub(crate) fn correlation(indexed: &IndexedModel, touch: &TouchUpdate<'_>) -> Option<f64> {
+        let apart = touch.percepts.contact.position_m - touch.nearest.contact.position_m;
+        let reach_m = ERROR_REACH * indexed.gap_m;
+        let square = apart.norm_squared() / (reach_m * reach_m).max(f64::MIN_POSITIVE);
+        Some((-0.25 * square).exp()).filter(|correlation| *correlation >= SHARED_MIN)
+    }
+
+    /// Variance of the nearest contact before a touch, as it is known now, per axis \[m²\].
+    pub(crate) fn noise_m2(touch: &TouchUpdate<'_>) -> f64 {
+        let [now, earlier] = [&touch.percepts, &touch.nearest].map(|own| own.contact);
+        let drift_m2 = now.drift_sd_m.powi(2) - earlier.drift_sd_m.powi(2);
+        earlier.position_sd_m.powi(2) + drift_m2.max(0.0)
+    }
+
+    /// At the nearest contact before a touch, which a hypothesis has at a point of its model, known
+    /// to a variance of `variance_m2` per axis, and takes for one with this place. None where the
+    /// place was felt, and where the contact is not as the model predicts at all.
     pub(crate) fn new(
-        search: &mut CandidateSearch,
-        (indexed, map_from_episode): (&IndexedModel, &Isometry3<f64>),
-        hypothesis: &TranslationHypothesis,
+        place: &IndexedPlace,
         touch: &TouchUpdate<'_>,
-        least: f64,
+        correlation: f64,
+        (point, variance_m2): (&Point3<f64>, f64),
     ) -> Option<Self> {
         let (earlier, contact) = (touch.nearest.contact, touch.percepts.contact);
-        let square = (contact.position_m - earlier.position_m).norm_squared();
-        let reach_m = ERROR_REACH * indexed.gap_m;
-        let correlation = (-0.25 * square / (reach_m * reach_m).max(f64::MIN_POSITIVE)).exp();
-        if correlation < SHARED_MIN {
-            return None;
-        }
-        let drift_m2 = contact.drift_sd_m.powi(2) - earlier.drift_sd_m.powi(2);
-        let noise_m2 = earlier.position_sd_m.powi(2) + drift_m2.max(0.0);
-        let point = map_from_episode * earlier.position_m;
-        let local = touch.nearest.at(indexed, &map_from_episode.rotation);
-        let variance_m2 = noise_m2 + hypothesis.variance_m2;
-        let place = search.best(indexed, &point, variance_m2, (&local, least))?;
+        let noise_m2 = Self::noise_m2(touch);
         let prediction = place.prediction.as_ref()?;
         let offset = prediction.across * (point - place.position);
         let is_usual = |square: f64, variance: f64| square <= SHARED_DEVIATIONS.powi(2) * variance;
@@ -231,7 +233,7 @@ mod tests {
     #[test]
     fn a_place_that_was_felt_keeps_what_it_is() {
         let place = |error_m2: Option<f64>, normal: Vector3<f64>| IndexedPlace {
-            position: nalgebra::Point3::origin(),
+            position: Point3::origin(),
             normal: None,
             variance_m2: 4e-6,
             prediction: error_m2.map(|error_m2| crate::indexed_place::Prediction {

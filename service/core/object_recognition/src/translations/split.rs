@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion};
+use nalgebra::{Point3, UnitQuaternion};
 
 use crate::indexed_model::IndexedModel;
 use crate::library::ObjectLibrary;
@@ -53,20 +53,16 @@ impl SplitBuffers {
         let packed = &indexed.packed;
         let mut densities = (self.search).find(packed, &point, prior + noise, local);
         let one = share(indexed.places.len()) / TAU.powf(1.5);
-        let shared = indexed
-            .between_sd_m
-            .filter(|_| densities > 0.0)
-            .and_then(|_| {
-                let pose = Isometry3::from_parts(hypothesis.translation.into(), *rotation);
-                let least = touch.outlier / one;
-                SharedError::new(
-                    &mut self.earlier,
-                    (indexed, &pose),
-                    hypothesis,
-                    touch,
-                    least,
-                )
-            });
+        let correlation = indexed.between_sd_m.filter(|_| densities > 0.0);
+        let correlation = correlation.and_then(|_| SharedError::correlation(indexed, touch));
+        let shared = correlation.and_then(|correlation| {
+            let earlier = rotation * touch.nearest.contact.position_m.coords;
+            let point = Point3::from(earlier + hypothesis.translation);
+            let variance_m2 = SharedError::noise_m2(touch) + hypothesis.variance_m2;
+            let likely = (&touch.nearest.at(indexed, rotation), touch.outlier / one);
+            let place = self.earlier.best(indexed, &point, variance_m2, likely)?;
+            SharedError::new(place, touch, correlation, (&point, variance_m2))
+        });
         if let Some(error) = &shared {
             densities = (self.search).conditioned(indexed, error, [prior, noise], candidates);
         }
