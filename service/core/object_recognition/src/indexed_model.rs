@@ -112,6 +112,13 @@ impl IndexedModel {
         }
     }
 
+    /// Correlation of the errors of what is predicted at two points, of which the square of the
+    /// distance is given \[m²\]: `reach` is how far they are common, in typical gaps.
+    pub(crate) fn error_correlation(&self, square_m2: f64, reach: f64) -> f64 {
+        let reach_m = reach * self.gap_m;
+        (-0.25 * square_m2 / (reach_m * reach_m).max(f64::MIN_POSITIVE)).exp()
+    }
+
     /// Mean share of the model within `reach_m` of one of its places.
     pub(crate) fn share(&self, reach_m: f64) -> f64 {
         let at = (reach_m / self.extent_m).clamp(0.0, 1.0) * SHARE_BINS as f64;

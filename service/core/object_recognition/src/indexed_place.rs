@@ -43,7 +43,7 @@ impl IndexedPlace {
             let own = self.level(reading.channel);
             let prior = LevelPrior::of(level_prior, reading.channel);
             if let Some((own, prior)) = own.zip(prior) {
-                sum += prior.ratio(reading, own.mean, own.variance()).ln();
+                sum += prior.rated(reading).ratio(own.mean, own.variance()).ln();
             }
         }
         sum + self.descriptor_log(contact)

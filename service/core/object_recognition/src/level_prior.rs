@@ -133,6 +133,26 @@ impl Component {
     }
 }
 
+/// A level that was read, with how likely it is anywhere.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RatedLevel {
+    pub(crate) value: f64,
+    /// Variance of its noise.
+    pub(crate) noise: f64,
+    /// Its density anywhere, times √(2π).
+    density: f64,
+}
+
+impl RatedLevel {
+    /// Likelihood ratio: at a place with levels of this mean and variance, against anywhere.
+    pub(crate) fn ratio(&self, mean: f64, variance: f64) -> f64 {
+        let variance = variance + self.noise;
+        let apart = self.value - mean;
+        let here = (-0.5 * apart * apart / variance).exp() / variance.sqrt();
+        (1.0 - WRONG_PERCEPT_SHARE) * here / self.density + WRONG_PERCEPT_SHARE
+    }
+}
+
 impl LevelPrior {
     /// Of the levels of an object, one for each place.
     fn of_object(channel: u16, levels: Vec<f64>) -> Self {
@@ -153,12 +173,13 @@ impl LevelPrior {
         priors.iter().find(|own| own.channel == channel)
     }
 
-    /// Likelihood ratio of a reading: at a place of this level, against anywhere.
-    pub(crate) fn ratio(&self, reading: &LevelReading, mean: f64, variance: f64) -> f64 {
-        let variance = variance + self.noise(reading);
-        let apart = reading.value - mean;
-        let here = (-0.5 * apart * apart / variance).exp() / variance.sqrt();
-        (1.0 - WRONG_PERCEPT_SHARE) * here / self.density(reading) + WRONG_PERCEPT_SHARE
+    /// A reading of its channel, ready to be compared with places.
+    pub(crate) fn rated(&self, reading: &LevelReading) -> RatedLevel {
+        RatedLevel {
+            value: reading.value,
+            noise: self.noise(reading),
+            density: self.density(reading),
+        }
     }
 
     /// Variance of the noise of a reading: its own, and a part of that of the levels like it.

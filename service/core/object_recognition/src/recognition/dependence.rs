@@ -24,10 +24,10 @@ pub(super) fn evidence_share(
     let shares = shares.map(|(point, contact)| error_share(indexed, point, contact));
     let count = points.len().max(1) as f64;
     let share = shares.sum::<f64>() / count;
-    let per = -0.25 / (reach * indexed.gap_m).powi(2).max(f64::MIN_POSITIVE);
     let correlations = points.iter().enumerate().map(|(number, point)| {
         let before = points[..number].iter();
-        let correlation = |other: &Point3<f64>| (per * (other - point).norm_squared()).exp();
+        let square = |other: &Point3<f64>| (other - point).norm_squared();
+        let correlation = |other: &Point3<f64>| indexed.error_correlation(square(other), reach);
         1.0 + 2.0 * before.map(correlation).sum::<f64>()
     });
     let common = correlations.sum::<f64>() / count;

@@ -70,6 +70,33 @@ fn a_ball_of_sixty_contacts_is_round() {
     assert!((0.1..1.5).contains(&claimed), "{claimed}");
 }
 
+/// A hand that rests, and says that it is exact, learns nothing by it.
+#[test]
+fn a_hand_that_rests_on_a_known_box_calls_it_nothing_else() {
+    let library = taught(WAVES, 0..4, 60);
+    for position_sd_m in [0.0, NOISE_M] {
+        let mut recognition = Recognition::new(&Orientation::Known);
+        let run = run_over(WAVES, 2, 30);
+        let still = std::iter::repeat_n(run[29].clone(), 40);
+        for (count, contact) in (1..).zip(run.iter().cloned().chain(still)) {
+            let position_sd_m = position_sd_m.min(contact.position_sd_m);
+            recognition.touch(
+                &library,
+                Contact {
+                    position_sd_m,
+                    ..contact
+                },
+            );
+            let posterior = recognition.posterior(&library);
+            let all: f64 = posterior.objects.iter().map(|own| own.1).sum();
+            let sum = all + posterior.unknown;
+            assert!((sum - 1.0).abs() < 1e-9, "{sum} after {count} touches");
+            let verdict = posterior.verdict();
+            assert_ne!(verdict, Verdict::Unknown, "after {count} touches");
+        }
+    }
+}
+
 #[test]
 fn boxes_of_sixty_contacts_are_named_by_a_walk() {
     let library = taught(WAVES, 0..4, 60);

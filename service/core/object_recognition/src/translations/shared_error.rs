@@ -5,9 +5,9 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use crate::contact::LevelReading;
 use crate::indexed_model::IndexedModel;
 use crate::indexed_place::IndexedPlace;
-use crate::level_prior::LevelPrior;
+use crate::level_prior::{LevelPrior, RatedLevel};
 use crate::translations::touch_update::TouchUpdate;
-use crate::tuning::{ERROR_REACH, SHARED_DEVIATIONS, SHARED_MIN, WRONG_PERCEPT_SHARE};
+use crate::tuning::{ERROR_REACH, SHARED_DEVIATIONS, SHARED_MIN};
 
 /// What an earlier contact tells of the error of a model's prediction.
 ///
@@ -42,10 +42,8 @@ struct SharedLevel {
     channel: u16,
     told: Told,
     residual: f64,
-    /// The other contact's level, the variance of its noise, and its density anywhere times √(2π).
-    value: f64,
-    noise: f64,
-    density: f64,
+    /// The level of the other contact.
+    now: RatedLevel,
 }
 
 /// A place as it is after an earlier contact.
@@ -76,9 +74,8 @@ impl SharedError {
     /// hardly any.
     pub(crate) fn correlation(indexed: &IndexedModel, touch: &TouchUpdate<'_>) -> Option<f64> {
         let apart = touch.percepts.contact.position_m - touch.nearest.contact.position_m;
-        let reach_m = ERROR_REACH * indexed.gap_m;
-        let square = apart.norm_squared() / (reach_m * reach_m).max(f64::MIN_POSITIVE);
-        Some((-0.25 * square).exp()).filter(|correlation| *correlation >= SHARED_MIN)
+        let correlation = indexed.error_correlation(apart.norm_squared(), ERROR_REACH);
+        Some(correlation).filter(|own| *own >= SHARED_MIN)
     }
 
     /// Variance of the nearest contact before a touch, as it is known now, per axis \[m²\].
@@ -109,15 +106,12 @@ impl SharedError {
             let channel = reading.channel;
             let (own, now) = (place.level(channel)?, contact.level(channel)?);
             let prior = LevelPrior::of(touch.level_prior, channel)?;
-            let residual = reading.value - own.mean;
-            let noise = prior.noise(reading);
+            let (residual, noise) = (reading.value - own.mean, prior.noise(reading));
             is_usual(residual * residual, own.variance() + noise).then(|| SharedLevel {
                 channel,
                 told: Told::new(correlation, own.variance(), noise),
                 residual,
-                value: now.value,
-                noise: prior.noise(now),
-                density: prior.density(now),
+                now: prior.rated(now),
             })
         });
         Some(Self {
@@ -128,8 +122,8 @@ impl SharedError {
         })
     }
 
-    /// A place about the touch; of one that was felt nothing changes. Errors are shared as far as
-    /// both surfaces have the same normal.
+    /// A place about the touch; of one that was felt nothing changes. Errors of the position are
+    /// shared as far as both surfaces have the same normal, those of levels round edges too.
     pub(crate) fn condition(&self, place: &IndexedPlace) -> Conditioned {
         let Some(prediction) = &place.prediction else {
             return Conditioned {
@@ -157,14 +151,9 @@ impl SharedLevel {
     fn ratio(&self, place: &IndexedPlace) -> Option<f64> {
         let own = place.level(self.channel)?;
         let variance = own.variance();
-        let likelihood = |mean: f64, variance: f64| {
-            let all = variance + self.noise;
-            let here = (-0.5 * (self.value - mean).powi(2) / all).exp() / all.sqrt();
-            (1.0 - WRONG_PERCEPT_SHARE) * here / self.density + WRONG_PERCEPT_SHARE
-        };
         let mean = own.mean + self.told.gain * variance.sqrt() * self.residual;
-        let now = likelihood(mean, variance * (1.0 - self.told.known));
-        Some(now / likelihood(own.mean, variance))
+        let told = self.now.ratio(mean, variance * (1.0 - self.told.known));
+        Some(told / self.now.ratio(own.mean, variance))
     }
 }
 
