@@ -24,10 +24,38 @@ pub(crate) struct IndexedPlace {
 /// How a place was predicted from the places around.
 #[derive(Clone, Debug)]
 pub(crate) struct Prediction {
-    /// Variance of its error across the surface, per axis \[m²\].
-    pub(crate) error_m2: f64,
-    /// Projects an offset on what is across the surface.
-    pub(crate) across: Matrix3<f64>,
+    /// Standard deviation of its error across the surface, per axis \[m\].
+    pub(crate) error_m: f64,
+    pub(crate) across: Across,
+}
+
+/// What is across a surface: one direction, across a curve two, and all where neither was found.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Across {
+    /// Projects an offset on it.
+    pub(crate) projection: Matrix3<f64>,
+    /// Its dimensions, from 1 to 3.
+    pub(crate) dimensions: i32,
+}
+
+impl Across {
+    /// Of a surface or a curve along these perpendicular axes.
+    pub(crate) fn new<'a>(along: impl Iterator<Item = &'a Vector3<f64>>) -> Self {
+        let all = Self {
+            projection: Matrix3::identity(),
+            dimensions: 3,
+        };
+        along.fold(all, |own, axis| Self {
+            projection: own.projection - axis * axis.transpose(),
+            dimensions: own.dimensions - 1,
+        })
+    }
+
+    /// Share of it that is across another surface as well.
+    pub(crate) fn common(&self, other: &Self) -> f64 {
+        let common = self.projection.dot(&other.projection) / f64::from(self.dimensions.max(1));
+        common.clamp(0.0, 1.0)
+    }
 }
 
 impl IndexedPlace {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use crate::contact::{Contact, LevelReading};
 use crate::model::{LevelMemory, ModelPlace};
-use crate::numeric::floor_u32;
+use crate::numeric::{exp, floor_u32, to_f32};
 use crate::tuning::{
     LEVEL_DENSITY_FLOOR, LEVEL_MAX, LEVEL_REACH, LEVEL_ROUNDING, LEVEL_VARIANCE_FLOOR,
     UNUSUAL_SHARE_MAX, WRONG_PERCEPT_SHARE,
@@ -148,7 +148,8 @@ impl RatedLevel {
     pub(crate) fn ratio(&self, mean: f64, variance: f64) -> f64 {
         let variance = variance + self.noise;
         let apart = self.value - mean;
-        let here = (-0.5 * apart * apart / variance).exp() / variance.sqrt();
+        let fall = exp(to_f32(-0.5 * apart * apart / variance));
+        let here = f64::from(fall) / variance.sqrt();
         (1.0 - WRONG_PERCEPT_SHARE) * here / self.density + WRONG_PERCEPT_SHARE
     }
 }

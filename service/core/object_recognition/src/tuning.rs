@@ -219,9 +219,12 @@ pub(crate) const NODE_FIELD: f64 = 0.288_675;
 // Translations: the Gaussian sum.
 
 /// Hypotheses kept. Budget.
-pub(crate) const TRANSLATIONS_MAX: usize = 4096;
+pub(crate) const TRANSLATIONS_MAX: usize = 2048;
 /// A hypothesis so far below the best holds nothing worth its keep \[nats\]. Chosen.
 pub(crate) const PRUNE_NATS: f64 = 20.0;
+/// The same of a model of which contacts share errors: few of them count in full, so that what lies
+/// so far behind seldom catches up. Chosen.
+pub(crate) const SHARED_PRUNE_NATS: f64 = 14.0;
 /// A hypothesis splits where several places could be the one touched; each part has this share of
 /// the contact's likelihood at least. Chosen.
 pub(crate) const SPLIT_SHARE_MIN: f64 = 0.005;

@@ -1,9 +1,10 @@
 //! What a model's places say of how a field varies between them.
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 
 use super::graph::{LinkGraph, median};
 use super::kriging::{Kriging, Weights};
+use crate::indexed_place::Across;
 use crate::model::{LevelMemory, ModelPlace};
 use crate::tuning::{
     ERROR_NEIGHBOURS, FIELD_LENGTHS, FIELD_NOISES, FIELD_SAMPLES, KRIGING_CURVE, KRIGING_SURFACE,
@@ -278,10 +279,9 @@ impl LocalField {
         (weights, variance)
     }
 
-    /// Projects an offset on what is across the plane or line over which places are predicted.
-    pub(super) fn across(&self) -> Matrix3<f64> {
-        let axes = self.over.iter().flat_map(|over| &over.axes);
-        Matrix3::identity() - { axes.map(|axis| axis * axis.transpose()) }.sum::<Matrix3<f64>>()
+    /// What is across the plane or line over which places are predicted.
+    pub(super) fn across(&self) -> Across {
+        Across::new(self.over.iter().flat_map(|over| &over.axes))
     }
 
     fn weights(&self, point: &Point3<f64>) -> Weights {

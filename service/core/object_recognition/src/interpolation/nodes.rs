@@ -265,7 +265,7 @@ impl LocalFields {
             normal: nalgebra::Unit::try_new(normals, 1e-9),
             variance_m2: field_m * field_m + across_m2,
             prediction: Some(Prediction {
-                error_m2: across_m2,
+                error_m: across_m2.sqrt(),
                 across: self.place.across(),
             }),
             levels: self.levels.iter().filter_map(level).collect(),

@@ -1,13 +1,13 @@
 //! Candidates: the places that a touch could be of, given where a hypothesis predicts it.
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 use pulp::Arch;
 
 use crate::index::packed_places::PackedPlaces;
 use crate::index::shortlist::Shortlist;
 use crate::indexed_model::IndexedModel;
-use crate::indexed_place::IndexedPlace;
-use crate::numeric::exp;
+use crate::indexed_place::{Across, IndexedPlace};
+use crate::numeric::{exp, to_f32};
 use crate::percept_likelihood::{LANES, PerceptLikelihood};
 use crate::translations::shared_error::SharedError;
 use crate::tuning::CONDITIONED_MIN;
@@ -23,7 +23,7 @@ pub(crate) struct Candidate {
     pub(crate) variance: f64,
     /// What is across the surface, and how far an error of the translation shows in the offset
     /// there; none where it shows everywhere.
-    pub(crate) across: Option<(Matrix3<f64>, f64)>,
+    pub(crate) across: Option<(Across, f64)>,
 }
 
 impl Candidate {
@@ -37,8 +37,8 @@ impl Candidate {
             return (self.apart * along, prior_m2 - along * prior_m2);
         };
         let gained = gain(*shown);
-        let offset = across * self.apart;
-        let dimensions = across.trace();
+        let offset = across.projection * self.apart;
+        let dimensions = f64::from(across.dimensions);
         let told = dimensions * gained * shown + (3.0 - dimensions) * along;
         let moved = offset * gained + (self.apart - offset) * along;
         (moved, prior_m2 - told / 3.0 * prior_m2)
@@ -120,17 +120,17 @@ impl CandidateSearch {
             };
             if let Some(prediction) = &place.prediction {
                 candidate.across = Some((prediction.across, own.shown));
-                let across = prediction.across * apart;
-                let dimensions = prediction.across.trace();
+                let across = prediction.across.projection * apart;
+                let dimensions = prediction.across.dimensions;
                 let [along_m2, across_m2] = [1.0, own.shown * own.shown]
                     .map(|shown| candidate.variance + shown * translation_m2);
                 let before_m2 = f64::from(near.variance);
                 let fall = f64::from(near.square) / before_m2
                     - across.norm_squared() / across_m2
                     - (apart - across).norm_squared() / along_m2;
-                let widths = dimensions * (before_m2 / across_m2).ln()
-                    + (3.0 - dimensions) * (before_m2 / along_m2).ln();
-                candidate.density *= (0.5 * (fall + widths)).exp();
+                let width = (before_m2 / across_m2).sqrt().powi(dimensions)
+                    * (before_m2 / along_m2).sqrt().powi(3 - dimensions);
+                candidate.density *= f64::from(exp(to_f32(0.5 * fall))) * width;
             }
             candidates.push(candidate);
         }

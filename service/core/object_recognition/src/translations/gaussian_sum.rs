@@ -19,7 +19,7 @@ use crate::translations::touch_update::{TouchUpdate, nearest_contact};
 use crate::translations::unexplored::Unexplored;
 use crate::tuning::{
     NEGLIGIBLE_SHARE, PREFILTER_CONTACTS_MAX, PROMOTION_MAX, PROMOTION_MIN, PROMOTION_SEEDS,
-    PRUNE_NATS, TRANSLATIONS_MAX, WAITING_CONTACTS, WAITING_SHARE,
+    PRUNE_NATS, SHARED_PRUNE_NATS, TRANSLATIONS_MAX, WAITING_CONTACTS, WAITING_SHARE,
 };
 
 /// All hypotheses.
@@ -99,7 +99,7 @@ impl GaussianSum {
         { &self.unexplored }.entered(library, rotations, (last, contact), bare, least, &mut parts);
         self.unexplored.stayed(densities);
         self.all = merged(&parts);
-        self.prune();
+        self.prune(library);
         Some(unknown?.log)
     }
 
@@ -202,12 +202,29 @@ impl GaussianSum {
 
     /// Drops hypotheses without evidence, and the lightest beyond the budget; each object keeps its
     /// best.
-    fn prune(&mut self) {
+    fn prune(&mut self, library: &ObjectLibrary) {
         let most = TRANSLATIONS_MAX;
         let evidences = self.all.iter().map(|hypothesis| hypothesis.evidence);
-        let best = evidences.clone().fold(self.prefilter.best_log(), f64::max);
-        let mut least = best - PRUNE_NATS;
-        let mut evidences: Vec<f64> = evidences.filter(|evidence| *evidence > least).collect();
+        let best = evidences.fold(self.prefilter.best_log(), f64::max);
+        let is_shared = |object| {
+            let indexed = library.indexed(object);
+            indexed.is_some_and(|indexed| indexed.between_sd_m.is_some())
+        };
+        let by_object = || self.all.chunk_by(|a, b| a.object == b.object);
+        let mut evidences = Vec::with_capacity(self.all.len());
+        let mut floors = Vec::new();
+        for own in by_object() {
+            let nats = if is_shared(own[0].object) {
+                SHARED_PRUNE_NATS
+            } else {
+                PRUNE_NATS
+            };
+            let floor = best - nats;
+            floors.push(floor);
+            let heavy = own.iter().map(|hypothesis| hypothesis.evidence);
+            evidences.extend(heavy.filter(|evidence| *evidence > floor));
+        }
+        let mut least = f64::NEG_INFINITY;
         // Room for hypotheses exactly as heavy as the lightest.
         let mut room = usize::MAX;
         if evidences.len() > most {
@@ -217,12 +234,11 @@ impl GaussianSum {
             room = most - heavier.iter().filter(|evidence| **evidence > least).count();
         }
         let mut kept = Vec::with_capacity(self.all.len().min(most));
-        for own in self.all.chunk_by(|a, b| a.object == b.object) {
+        for (own, floor) in by_object().zip(floors) {
             let before = kept.len();
-            for hypothesis in own {
-                let is_heavy = hypothesis.evidence > least;
-                let is_lightest = !is_heavy && hypothesis.evidence >= least && room > 0;
-                if is_heavy || is_lightest {
+            for hypothesis in own.iter().filter(|own| own.evidence > floor) {
+                let is_lightest = hypothesis.evidence <= least;
+                if !is_lightest || hypothesis.evidence >= least && room > 0 {
                     room -= usize::from(is_lightest);
                     kept.push(*hypothesis);
                 }

@@ -1,11 +1,10 @@
 //! Errors that contacts share: what is predicted between the places of a model errs alike nearby.
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 
-use crate::contact::LevelReading;
 use crate::indexed_model::IndexedModel;
-use crate::indexed_place::IndexedPlace;
-use crate::level_prior::{LevelPrior, RatedLevel};
+use crate::indexed_place::{Across, IndexedPlace};
+use crate::level_prior::RatedLevel;
 use crate::translations::touch_update::TouchUpdate;
 use crate::tuning::{ERROR_REACH, SHARED_DEVIATIONS, SHARED_MIN};
 
@@ -22,8 +21,8 @@ pub(crate) struct SharedError {
     position: Told,
     /// The residual across the surface \[m\].
     offset: Vector3<f64>,
-    /// Projects an offset on what is across the surface there.
-    across: Matrix3<f64>,
+    /// What is across the surface there.
+    across: Across,
     levels: Vec<SharedLevel>,
 }
 
@@ -60,29 +59,23 @@ pub(crate) struct Conditioned {
 }
 
 impl Told {
-    fn new(correlation: f64, error: f64, noise: f64) -> Self {
-        let all = (error + noise).max(f64::MIN_POSITIVE);
+    fn new(correlation: f64, error_sd: f64, noise: f64) -> Self {
+        let gain = correlation * error_sd / (error_sd * error_sd + noise).max(f64::MIN_POSITIVE);
         Self {
-            gain: correlation * error.sqrt() / all,
-            known: correlation * correlation * error / all,
+            gain,
+            known: gain * correlation * error_sd,
         }
     }
 }
 
 impl SharedError {
     /// Correlation of the errors at a touch and at the nearest contact before; none where they have
-    /// hardly any.
+    /// hardly any, and in a model of which nothing was predicted.
     pub(crate) fn correlation(indexed: &IndexedModel, touch: &TouchUpdate<'_>) -> Option<f64> {
+        indexed.between_sd_m?;
         let apart = touch.percepts.contact.position_m - touch.nearest.contact.position_m;
         let correlation = indexed.error_correlation(apart.norm_squared(), ERROR_REACH);
         Some(correlation).filter(|own| *own >= SHARED_MIN)
-    }
-
-    /// Variance of the nearest contact before a touch, as it is known now, per axis \[m²\].
-    pub(crate) fn noise_m2(touch: &TouchUpdate<'_>) -> f64 {
-        let [now, earlier] = [&touch.percepts, &touch.nearest].map(|own| own.contact);
-        let drift_m2 = now.drift_sd_m.powi(2) - earlier.drift_sd_m.powi(2);
-        earlier.position_sd_m.powi(2) + drift_m2.max(0.0)
     }
 
     /// At the nearest contact before a touch, which a hypothesis has at a point of its model, known
@@ -94,30 +87,28 @@ impl SharedError {
         correlation: f64,
         (point, variance_m2): (&Point3<f64>, f64),
     ) -> Option<Self> {
-        let (earlier, contact) = (touch.nearest.contact, touch.percepts.contact);
-        let noise_m2 = Self::noise_m2(touch);
         let prediction = place.prediction.as_ref()?;
-        let offset = prediction.across * (point - place.position);
+        let (error_m, across) = (prediction.error_m, prediction.across);
+        let offset = across.projection * (point - place.position);
         let is_usual = |square: f64, variance: f64| square <= SHARED_DEVIATIONS.powi(2) * variance;
-        if !is_usual(offset.norm_squared(), prediction.error_m2 + variance_m2) {
+        if !is_usual(offset.norm_squared(), error_m * error_m + variance_m2) {
             return None;
         }
-        let levels = earlier.levels.iter().filter_map(|reading: &LevelReading| {
-            let channel = reading.channel;
-            let (own, now) = (place.level(channel)?, contact.level(channel)?);
-            let prior = LevelPrior::of(touch.level_prior, channel)?;
-            let (residual, noise) = (reading.value - own.mean, prior.noise(reading));
-            is_usual(residual * residual, own.variance() + noise).then(|| SharedLevel {
-                channel,
-                told: Told::new(correlation, own.variance(), noise),
+        let levels = touch.level_pairs.iter().filter_map(|pair| {
+            let own = place.level(pair.channel)?;
+            let (variance, noise) = (own.variance(), pair.earlier.noise);
+            let residual = pair.earlier.value - own.mean;
+            is_usual(residual * residual, variance + noise).then(|| SharedLevel {
+                channel: pair.channel,
+                told: Told::new(correlation, variance.sqrt(), noise),
                 residual,
-                now: prior.rated(now),
+                now: pair.now,
             })
         });
         Some(Self {
-            position: Told::new(correlation, prediction.error_m2, noise_m2),
+            position: Told::new(correlation, error_m, touch.nearest_m2),
             offset,
-            across: prediction.across,
+            across,
             levels: levels.collect(),
         })
     }
@@ -133,14 +124,13 @@ impl SharedError {
                 level_ratio: 1.0,
             };
         };
-        let dimensions = self.across.trace().max(1.0);
-        let alike = ((self.across * prediction.across).trace() / dimensions).clamp(0.0, 1.0);
-        let gain = alike * self.position.gain * prediction.error_m2.sqrt();
-        let known = alike * alike * self.position.known;
+        let alike = self.across.common(&prediction.across);
+        let gain = alike * self.position.gain * prediction.error_m;
+        let known = alike * alike * self.position.known * prediction.error_m * prediction.error_m;
         let ratios = self.levels.iter().filter_map(|own| own.ratio(place));
         Conditioned {
-            offset: prediction.across * self.offset * gain,
-            variance_m2: place.variance_m2 - known * prediction.error_m2,
+            offset: prediction.across.projection * self.offset * gain,
+            variance_m2: place.variance_m2 - known,
             shown: 1.0 - gain,
             level_ratio: ratios.product(),
         }
@@ -172,7 +162,7 @@ mod tests {
             (1e-6, 1e-8, 0.999, 2e-3),
             (9.0, 0.0, 0.3, 5.0),
         ] {
-            let told = Told::new(correlation, error, noise);
+            let told = Told::new(correlation, f64::sqrt(error), noise);
             for other in [0.5, 1.0, 7.0] {
                 let other = other * error;
                 let across = correlation * f64::sqrt(error * other);
@@ -211,7 +201,7 @@ mod tests {
             [mean, prior - gain * shown * prior]
         };
         let first = step([0.0, prior], residuals[0], 1.0, own);
-        let told = Told::new(correlation, error, noise);
+        let told = Told::new(correlation, f64::sqrt(error), noise);
         let gain = told.gain * other.sqrt();
         let left = other * (1.0 - told.known) + noise;
         let both = step(first, residuals[1] - gain * residuals[0], 1.0 - gain, left);
@@ -221,21 +211,26 @@ mod tests {
 
     #[test]
     fn a_place_that_was_felt_keeps_what_it_is() {
+        let across = |normal: Vector3<f64>| {
+            let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+            let along = { axes.iter() }.filter(|axis| axis.dot(&normal) == 0.0);
+            Across::new(along)
+        };
         let place = |error_m2: Option<f64>, normal: Vector3<f64>| IndexedPlace {
             position: Point3::origin(),
             normal: None,
             variance_m2: 4e-6,
             prediction: error_m2.map(|error_m2| crate::indexed_place::Prediction {
-                error_m2,
-                across: Matrix3::from_diagonal(&normal),
+                error_m: error_m2.sqrt(),
+                across: across(normal),
             }),
             levels: Vec::new(),
             descriptors: Vec::new(),
         };
         let error = SharedError {
-            position: Told::new(1.0, 3e-6, 1e-6),
+            position: Told::new(1.0, f64::sqrt(3e-6), 1e-6),
             offset: Vector3::z() * 2e-3,
-            across: Matrix3::from_diagonal(&Vector3::z()),
+            across: across(Vector3::z()),
             levels: Vec::new(),
         };
         let felt = error.condition(&place(None, Vector3::z()));

@@ -14,6 +14,35 @@ use crate::translations::shared_error::SharedError;
 use crate::translations::touch_update::{TouchUpdate, share};
 use crate::tuning::{SPLIT_MAX, SPLIT_SHARE_MIN};
 
+/// A touch, against the places of a turned model.
+#[derive(Debug)]
+struct TurnedTouch<'a> {
+    touch: &'a TouchUpdate<'a>,
+    rotation: &'a UnitQuaternion<f64>,
+    indexed: &'a IndexedModel,
+    local: PerceptLikelihood<'a>,
+    /// The nearest contact before, and the correlation of the model's errors there and at the
+    /// touch; none where the one tells nothing of the other.
+    earlier: Option<(PerceptLikelihood<'a>, f64)>,
+}
+
+impl<'a> TurnedTouch<'a> {
+    fn new(
+        touch: &'a TouchUpdate<'a>,
+        indexed: &'a IndexedModel,
+        rotation: &'a UnitQuaternion<f64>,
+    ) -> Self {
+        Self {
+            touch,
+            rotation,
+            indexed,
+            local: touch.percepts.at(indexed, rotation),
+            earlier: SharedError::correlation(indexed, touch)
+                .map(|correlation| (touch.nearest.at(indexed, rotation), correlation)),
+        }
+    }
+}
+
 /// Buffers that are used again for every hypothesis.
 #[derive(Debug, Default)]
 pub(crate) struct SplitBuffers {
@@ -39,29 +68,27 @@ impl SplitBuffers {
     /// ([`Candidate::update`]), with the share of its density in the sum of all.
     fn split(
         &mut self,
-        rotation: &UnitQuaternion<f64>,
-        indexed: &IndexedModel,
         hypothesis: &TranslationHypothesis,
-        (touch, local): (&TouchUpdate<'_>, &PerceptLikelihood<'_>),
+        turned: &TurnedTouch<'_>,
         parts: &mut Vec<TranslationHypothesis>,
     ) {
+        let (touch, rotation, indexed) = (turned.touch, turned.rotation, turned.indexed);
         let candidates = &mut self.candidates;
         let contact = touch.percepts.contact;
         let prior = hypothesis.variance_m2 + touch.drift_m2;
         let noise = contact.position_sd_m * contact.position_sd_m;
         let point = Point3::from(rotation * contact.position_m.coords + hypothesis.translation);
         let packed = &indexed.packed;
-        let mut densities = (self.search).find(packed, &point, prior + noise, local);
+        let mut densities = (self.search).find(packed, &point, prior + noise, &turned.local);
         let one = share(indexed.places.len()) / TAU.powf(1.5);
-        let correlation = indexed.between_sd_m.filter(|_| densities > 0.0);
-        let correlation = correlation.and_then(|_| SharedError::correlation(indexed, touch));
-        let shared = correlation.and_then(|correlation| {
+        let shared = turned.earlier.as_ref().filter(|_| densities > 0.0);
+        let shared = shared.and_then(|(local, correlation)| {
             let earlier = rotation * touch.nearest.contact.position_m.coords;
             let point = Point3::from(earlier + hypothesis.translation);
-            let variance_m2 = SharedError::noise_m2(touch) + hypothesis.variance_m2;
-            let likely = (&touch.nearest.at(indexed, rotation), touch.outlier / one);
+            let variance_m2 = touch.nearest_m2 + hypothesis.variance_m2;
+            let likely = (local, touch.outlier / one);
             let place = self.earlier.best(indexed, &point, variance_m2, likely)?;
-            SharedError::new(place, touch, correlation, (&point, variance_m2))
+            SharedError::new(place, touch, *correlation, (&point, variance_m2))
         });
         if let Some(error) = &shared {
             densities = (self.search).conditioned(indexed, error, [prior, noise], candidates);
@@ -128,10 +155,10 @@ impl SplitBuffers {
                 continue;
             };
             let rotation = &rotations[usize::from(own[0].rotation)];
-            let local = touch.percepts.at(indexed, rotation);
+            let turned = TurnedTouch::new(touch, indexed, rotation);
             self.begin(own.len());
             for hypothesis in own {
-                self.split(rotation, indexed, hypothesis, (touch, &local), parts);
+                self.split(hypothesis, &turned, parts);
             }
         }
     }
@@ -152,9 +179,9 @@ impl SplitBuffers {
         for touch in touches {
             next.clear();
             self.begin(now.len());
-            let local = touch.percepts.at(indexed, rotation);
+            let turned = TurnedTouch::new(touch, indexed, rotation);
             for hypothesis in &now {
-                self.split(rotation, indexed, hypothesis, (*touch, &local), &mut next);
+                self.split(hypothesis, &turned, &mut next);
             }
             if next.len() > SPLIT_MAX {
                 next.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 
-use crate::contact::Contact;
+use crate::contact::{Contact, LevelReading};
 use crate::indexed_model::IndexedModel;
 use crate::interpolation::Part;
-use crate::level_prior::LevelPrior;
+use crate::level_prior::{LevelPrior, RatedLevel};
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::percept_likelihood::ContactPercepts;
 use crate::tuning::OUTLIER_SHARE;
@@ -18,14 +18,24 @@ pub(crate) struct TouchUpdate<'a> {
     pub(crate) percepts: ContactPercepts<'a>,
     /// The nearest contact before.
     pub(crate) nearest: ContactPercepts<'a>,
-    /// Distributions of levels over the library, by channel.
-    pub(crate) level_prior: &'a [LevelPrior],
+    /// Variance of that contact, as it is known now, per axis \[m²\].
+    pub(crate) nearest_m2: f64,
+    /// Levels that both of them have.
+    pub(crate) level_pairs: Vec<LevelPair>,
     /// Variance of the drift of path integration since the touch before, per axis \[m²\].
     pub(crate) drift_m2: f64,
     /// Density of outliers times their share \[1/m³\].
     pub(crate) outlier: f64,
     /// Densities of a contact with what the models do not predict.
     pub(crate) unexplored: &'a BTreeMap<ObjectId, UnpredictedDensity>,
+}
+
+/// A level of a touch, and that of the nearest contact before on the same channel.
+#[derive(Debug)]
+pub(crate) struct LevelPair {
+    pub(crate) channel: u16,
+    pub(crate) earlier: RatedLevel,
+    pub(crate) now: RatedLevel,
 }
 
 /// Densities of a contact with what a model does not predict \[1/m³\].
@@ -57,11 +67,23 @@ impl<'a> TouchUpdate<'a> {
         let (last, nearest) = { before.last() }
             .zip(nearest_contact(before, contact))
             .unwrap_or((contact, contact));
+        let pair = |earlier: &LevelReading| {
+            let channel = earlier.channel;
+            let prior = LevelPrior::of(level_prior, channel)?;
+            Some(LevelPair {
+                channel,
+                earlier: prior.rated(earlier),
+                now: prior.rated(contact.level(channel)?),
+            })
+        };
+        let drift_m2 =
+            |own: &Contact| (contact.drift_sd_m.powi(2) - own.drift_sd_m.powi(2)).max(0.0);
         Self {
             percepts: ContactPercepts::new(contact, level_prior),
             nearest: ContactPercepts::new(nearest, level_prior),
-            level_prior,
-            drift_m2: (contact.drift_sd_m.powi(2) - last.drift_sd_m.powi(2)).max(0.0),
+            nearest_m2: nearest.position_sd_m.powi(2) + drift_m2(nearest),
+            level_pairs: nearest.levels.iter().filter_map(pair).collect(),
+            drift_m2: drift_m2(last),
             outlier: OUTLIER_SHARE * library.clutter_per_m3(),
             unexplored,
         }
