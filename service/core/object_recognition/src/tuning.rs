@@ -253,11 +253,11 @@ pub(crate) const SEEDS_MAX: usize = 1 << 22;
 /// feel. Chosen.
 pub(crate) const YAW_TURNS: u16 = 180;
 /// Contacts that promoted seeds explain at a touch. Budget.
-pub(crate) const PROMOTION_MAX: usize = 1280;
+pub(crate) const PROMOTION_MAX: usize = 1024;
 /// The same at least. Budget.
 pub(crate) const PROMOTION_MIN: usize = 256;
 /// Seeds whose prefilter costs as much as `PROMOTION_MAX` exact contacts. Measured as running time.
-pub(crate) const PROMOTION_SEEDS: usize = 150_000;
+pub(crate) const PROMOTION_SEEDS: usize = 120_000;
 /// Contacts after which promotion no longer waits until all seeds that matter fit its budget: until
 /// then estimates tell them apart nearly as well. Chosen.
 pub(crate) const WAITING_CONTACTS: usize = 12;
