@@ -112,6 +112,11 @@ impl IndexedModel {
         }
     }
 
+    /// Whether contacts share errors: some of its places were predicted from others.
+    pub(crate) fn shares_errors(&self) -> bool {
+        self.between_sd_m.is_some()
+    }
+
     /// Correlation of the errors of what is predicted at two points, of which the square of the
     /// distance is given \[m²\]: `reach` is how far they are common, in typical gaps.
     pub(crate) fn error_correlation(&self, square_m2: f64, reach: f64) -> f64 {

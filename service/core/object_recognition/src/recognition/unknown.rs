@@ -136,7 +136,7 @@ impl Recognition {
             let told = self.told_by_outliers(gaps, &pose()?, outlier_log);
             return Some(lead.min(f64::max(lead - told, doubt)));
         }
-        if indexed.between_sd_m.is_none() {
+        if !indexed.shares_errors() {
             return Some(lead);
         }
         let pose = pose()?;

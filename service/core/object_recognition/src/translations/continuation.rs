@@ -34,7 +34,7 @@ pub(super) fn continued_log(
         extents_m += indexed.extent_m;
         spacings_m += indexed.spacing_m;
         curves += f64::from(indexed.is_curve);
-        shared |= indexed.between_sd_m.is_some();
+        shared |= indexed.shares_errors();
     }
     if !shared {
         return None;

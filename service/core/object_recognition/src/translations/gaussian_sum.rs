@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::UnitQuaternion;
 
 use crate::contact::{Contact, Reached};
+use crate::indexed_model::IndexedModel;
 use crate::library::{ObjectId, ObjectLibrary};
 use crate::numeric::{log_sum, to_f32};
 use crate::percept_likelihood::ContactPercepts;
@@ -206,15 +207,12 @@ impl GaussianSum {
         let most = TRANSLATIONS_MAX;
         let evidences = self.all.iter().map(|hypothesis| hypothesis.evidence);
         let best = evidences.fold(self.prefilter.best_log(), f64::max);
-        let is_shared = |object| {
-            let indexed = library.indexed(object);
-            indexed.is_some_and(|indexed| indexed.between_sd_m.is_some())
-        };
         let by_object = || self.all.chunk_by(|a, b| a.object == b.object);
         let mut evidences = Vec::with_capacity(self.all.len());
         let mut floors = Vec::new();
         for own in by_object() {
-            let nats = if is_shared(own[0].object) {
+            let indexed = library.indexed(own[0].object);
+            let nats = if indexed.is_some_and(IndexedModel::shares_errors) {
                 SHARED_PRUNE_NATS
             } else {
                 PRUNE_NATS

@@ -72,7 +72,9 @@ impl SharedError {
     /// Correlation of the errors at a touch and at the nearest contact before; none where they have
     /// hardly any, and in a model of which nothing was predicted.
     pub(crate) fn correlation(indexed: &IndexedModel, touch: &TouchUpdate<'_>) -> Option<f64> {
-        indexed.between_sd_m?;
+        if !indexed.shares_errors() {
+            return None;
+        }
         let apart = touch.percepts.contact.position_m - touch.nearest.contact.position_m;
         let correlation = indexed.error_correlation(apart.norm_squared(), ERROR_REACH);
         Some(correlation).filter(|own| *own >= SHARED_MIN)
