@@ -1,4 +1,7 @@
 //! A replay straight into the core.
+//!
+//! The past is relaxed between two samples, as soon as a relaxation begins: a service has threads
+//! for it, and its writer waits only where the robots' samples are faster than they are.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -24,6 +27,7 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
     let mut events = Vec::new();
     let mut samples = 0;
     let mut times_s = Vec::new();
+    let mut relaxations = Relaxations::default();
     for TeamBatch {
         robot,
         samples: batch,
@@ -52,6 +56,7 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
                 map.apply(&record, &mut events);
                 times_s.push(begin.elapsed().as_secs_f64());
                 events.clear();
+                relaxations.run(&map);
                 robot.note(&record, &map, interval_ns);
             },
         );
@@ -74,6 +79,7 @@ pub(super) fn replay(batches: &[TeamBatch], settings: &SpaceSettings) -> anyhow:
         closures: Some(map.closure_count() as u64),
         view_matches,
         times_s,
+        relaxations_s: relaxations.times_s,
     })
 }
 
@@ -94,6 +100,24 @@ fn matched_views(found: &ViewMatch, team: &BTreeMap<&str, Robot>) -> Option<Matc
         range_m: found.range_m(),
         probability: found.probability(),
     })
+}
+
+/// The relaxations that a map began.
+#[derive(Default)]
+struct Relaxations {
+    /// What each took \[s\].
+    times_s: Vec<f64>,
+}
+
+impl Relaxations {
+    /// Relaxes the past of the map, if that has begun and nobody has done it yet.
+    fn run(&mut self, map: &CognitiveMap) {
+        if let Some(job) = map.relaxation().filter(|job| !job.is_done()) {
+            let begin = Instant::now();
+            job.run();
+            self.times_s.push(begin.elapsed().as_secs_f64());
+        }
+    }
 }
 
 #[derive(Default)]

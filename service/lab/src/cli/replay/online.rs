@@ -72,6 +72,7 @@ pub(super) fn replay(
         closures: None,
         view_matches: Vec::new(),
         times_s: Vec::new(),
+        relaxations_s: Vec::new(),
     })
 }
 

@@ -22,6 +22,8 @@ pub(super) struct Outcome {
     pub(super) view_matches: Vec<MatchedViews>,
     /// What each sample took in the core \[s\]; nothing of a replay through a service.
     pub(super) times_s: Vec<f64>,
+    /// What each relaxation of the past took beside them \[s\]; likewise.
+    pub(super) relaxations_s: Vec<f64>,
 }
 
 /// What came out of a replay for one robot.
@@ -48,9 +50,10 @@ pub(super) struct MatchedViews {
     pub(super) probability: f64,
 }
 
-/// Times that samples took in the core \[ms\].
+/// Times that samples, or relaxations of the past, took in the core \[ms\].
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct Timing {
+    pub(super) count: usize,
     pub(super) mean: f64,
     pub(super) p50: f64,
     pub(super) p99: f64,
@@ -60,7 +63,7 @@ pub(super) struct Timing {
 }
 
 impl Timing {
-    /// Of the time of each sample \[s\]; none without any.
+    /// Of the time of each \[s\]; none without any.
     pub(super) fn of(mut times_s: Vec<f64>) -> Option<Self> {
         times_s.sort_by(f64::total_cmp);
         let quantile = |part: f64| {
@@ -74,6 +77,7 @@ impl Timing {
         };
         let total_s: f64 = times_s.iter().sum();
         Some(Self {
+            count: times_s.len(),
             mean: total_s / times_s.len() as f64 * 1e3,
             p50: quantile(0.5)? * 1e3,
             p99: quantile(0.99)? * 1e3,

@@ -38,6 +38,8 @@ pub(super) struct Report {
     consistency: Consistency,
     /// Of a replay straight into the core: times that samples took \[ms\].
     update_ms: Option<Timing>,
+    /// Likewise: times of relaxations of the past, which a service does beside them \[ms\].
+    relaxation_ms: Option<Timing>,
     /// Recorded time over the time that it took in the core.
     real_time_factor: Option<f64>,
     robots: BTreeMap<String, RobotReport>,
@@ -88,8 +90,11 @@ impl Report {
             }
         }
         let sum = |value: fn(&Outcome) -> u64| outcomes.iter().map(value).sum();
-        let times_s = outcomes.iter().flat_map(|outcome| &outcome.times_s);
-        let timing = Timing::of(times_s.copied().collect());
+        let timing = |times_s: fn(&Outcome) -> &[f64]| {
+            Timing::of(outcomes.iter().flat_map(times_s).copied().collect())
+        };
+        let update_ms = timing(|outcome| &outcome.times_s);
+        let relaxation_ms = timing(|outcome| &outcome.relaxations_s);
         let lasted_s = case.teams.iter().map(lasted_s).sum::<f64>();
         let of = |value: fn(&RobotReport) -> Option<f64>| mean(robots.values().filter_map(value));
         Self {
@@ -112,10 +117,13 @@ impl Report {
                 nees: nees.means(),
                 nis_mean: of(|robot| robot.consistency.nis_mean),
             },
-            update_ms: timing,
-            real_time_factor: timing
+            update_ms,
+            relaxation_ms,
+            real_time_factor: update_ms
                 .filter(|_| case.scoring.is_recorded)
-                .map(|timing| lasted_s / timing.total_s),
+                .map(|update| {
+                    lasted_s / (update.total_s + relaxation_ms.map_or(0.0, |it| it.total_s))
+                }),
             robots,
         }
     }
@@ -220,6 +228,12 @@ impl Report {
                 timing.p50 * 1e3,
                 timing.p99 * 1e3,
                 timing.max,
+            ))?;
+        }
+        if let Some(timing) = self.relaxation_ms {
+            output::line(&format!(
+                "{} relaxations of the past beside them, p50 {:.1} ms, max {:.1} ms",
+                timing.count, timing.p50, timing.max,
             ))?;
         }
         let closures = self
