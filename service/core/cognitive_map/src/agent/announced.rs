@@ -26,6 +26,8 @@ pub(crate) struct Announced {
     /// The movement before it.
     pub(super) before_latest: Option<Vector3<f64>>,
     pub(super) travelled_m: f64,
+    /// Sum of its turns, whichever way \[rad\].
+    turned_rad: f64,
     /// What became of its sightings.
     evidence: Evidence,
 }
@@ -38,6 +40,7 @@ state_of_struct!(Announced {
     latest,
     before_latest,
     travelled_m,
+    turned_rad,
     evidence,
 });
 
@@ -53,6 +56,7 @@ impl Announced {
             latest: None,
             before_latest: None,
             travelled_m: 0.0,
+            turned_rad: 0.0,
             evidence: Evidence::default(),
         }
     }
@@ -90,6 +94,7 @@ impl Announced {
         modules: &GridModules,
         entered: impl FnMut(usize, [i64; 3]),
     ) {
+        self.turned_rad += self.in_odom.rotation.angle_to(&in_odom.rotation);
         self.in_odom = *in_odom;
         // The grid moves by the displacement, not by a difference of positions, which far away from
         // the origin would have lost digits.
@@ -135,5 +140,13 @@ impl Announced {
         self.latest = None;
         self.before_latest = None;
         self.travelled_m = 0.0;
+        self.turned_rad = 0.0;
+    }
+
+    /// How far it goes and turns on average with each of so many samples of its session
+    /// \[m, rad\].
+    pub(crate) fn movement_per_sample(&self, samples: u64) -> (f64, f64) {
+        let share = 1.0 / samples.max(1) as f64;
+        (self.travelled_m * share, self.turned_rad * share)
     }
 }

@@ -110,9 +110,9 @@ impl Estimator {
         self.put(agent, &pose, PoseCovariance::from_sd(&sd).matrix());
     }
 
-    /// A new session of an agent: its odometry begins anew, and it may have been moved by about
-    /// `sd` \[m, m, m, rad, rad, rad\] since.
-    pub fn restart(&mut self, agent: u32, sd: &Vector6<f64>) {
+    /// An agent may have moved, or been moved, by about `sd` \[m, m, m, rad, rad, rad\] without its
+    /// odometry having told: between two sessions, or while its samples were lost.
+    pub fn go_unseen(&mut self, agent: u32, sd: &Vector6<f64>) {
         let Some(frame) = self.frame_of(agent) else {
             return;
         };

@@ -398,7 +398,7 @@ fn a_new_session_starts_less_certain() {
     let agent = estimator.enrol();
     estimator.start_pose(agent, &start(&Isometry3::identity(), 0.1), &mut Vec::new());
     let before = estimator.pose(agent).unwrap().1.position_sd_m();
-    estimator.restart(agent, &Vector6::repeat(1.0));
+    estimator.go_unseen(agent, &Vector6::repeat(1.0));
     let after = estimator.pose(agent).unwrap().1.position_sd_m();
     assert!((after * after - before * before - 3.0).abs() < 1e-9);
     assert_eq!(estimator.in_odom(agent), Some(Isometry3::identity()));

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Vector6};
 
+use super::tuning::UNSEEN_TURN_SD_MAX_RAD;
 use crate::agent::Agent;
 use crate::estimator::{Effect, Estimator};
 use crate::event::{Event, EventKind};
@@ -20,6 +21,7 @@ use crate::memory::strength::Clock;
 use crate::memory::trip::{TripEnd, TripMap, interval_s};
 use crate::memory::way::WayMap;
 use crate::settings::Settings;
+use geometry::OUT_OF_PLANE;
 use grid::GridModules;
 
 /// The map, open for one record of one agent.
@@ -87,7 +89,7 @@ impl Fold<'_> {
         if before.is_some() {
             let (length_m, angle_rad) = (self.settings.restart_sd_m, self.settings.restart_sd_rad);
             let sd = Vector6::from_fn(|k, _| if k < 3 { length_m } else { angle_rad });
-            self.estimator.restart(self.agent_id.0, &sd);
+            self.estimator.go_unseen(self.agent_id.0, &sd);
             self.keyframes.graph.restart(self.agent_id.0, &sd);
         }
         self.emit(EventKind::SessionStarted { session });
@@ -104,8 +106,31 @@ impl Fold<'_> {
         if reason == SkipReason::Lost {
             self.end_trip(TripEnd::Gap);
             self.end_episode();
+            self.go_unseen(from, to - from);
         }
         self.emit(EventKind::SamplesSkipped { from, to, reason });
+    }
+
+    /// The agent went on with as many samples as are lost, after `before` of its session: as far as
+    /// it goes on average, straight ahead or in any other way.
+    fn go_unseen(&mut self, before: u64, lost: u64) {
+        let (way_m, turn_rad) = self.agent.announced.movement_per_sample(before);
+        let lost = lost as f64;
+        let sd_m = way_m * lost;
+        if self.agent.placed() && sd_m > self.settings.lost_sd_m {
+            return self.lose_agent();
+        }
+        let sd_m = sd_m.min(self.settings.lost_sd_m);
+        let sd_rad = (turn_rad * lost).min(UNSEEN_TURN_SD_MAX_RAD);
+        let is_planar = self.estimator.is_planar(self.agent_id.0);
+        let sd = Vector6::from_fn(|k, _| match k {
+            _ if is_planar && OUT_OF_PLANE.contains(&k) => 0.0,
+            0..3 => sd_m,
+            _ => sd_rad,
+        });
+        self.agent.filter.cut();
+        self.estimator.go_unseen(self.agent_id.0, &sd);
+        self.keyframes.graph.go_unseen(self.agent_id.0, &sd);
     }
 
     /// Applies the next sample.

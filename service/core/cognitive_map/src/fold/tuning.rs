@@ -11,6 +11,9 @@ pub(super) const DRIFT_MAX: f64 = 3.0;
 /// Standard deviation of the position of an agent that was carried off, in the space's `lost_sd_m`.
 /// Without a recorded measurement.
 pub(super) const KIDNAPPED_SD: f64 = 10.0;
+/// Standard deviation of what an agent turned by where nothing is known of it \[rad\]. Source: no
+/// rotation is off by more than half a turn.
+pub(super) const UNSEEN_TURN_SD_MAX_RAD: f64 = 3.0;
 /// Radius about a point in which places are looked for, in the reach of a place. Source: as far as
 /// the index goes without a scan.
 pub(super) const NEAR_REACHES: f64 = 3.4;

@@ -14,7 +14,6 @@ use super::relaxation::Correction;
 use super::relaxation_job::RelaxationJob;
 use super::relaxation_outcome::RelaxationOutcome;
 use super::tuning;
-use place_recognition::ViewLog;
 
 impl KeyframeMap {
     /// Begins a relaxation if one is due and none is under way. The graph goes on, and with a later
@@ -37,14 +36,13 @@ impl KeyframeMap {
         } else {
             None
         };
-        let n_views = views.as_ref().map_or(0, ViewLog::len);
         let job = RelaxationJob::new(&self.graph, views, live());
         self.pending = Some(PendingRelaxation::Awaited(job));
         if self.graph.is_due() {
             // What comes from now on is for the next one.
             self.graph.constraints.schedule = Schedule::default();
         }
-        let mut meanwhile = Meanwhile::with_views(n_views);
+        let mut meanwhile = Meanwhile::default();
         meanwhile.note(agent, stamp_ns);
         self.graph.meanwhile = Some(Box::new(meanwhile));
     }

@@ -209,6 +209,13 @@ impl KeyframeGraph {
         if let Some(track) = self.track_mut(agent) {
             track.session += 1;
             track.needs_keyframe = true;
+        }
+        self.go_unseen(agent, sd);
+    }
+
+    /// An agent may have moved by about `sd` \[m, m, m, rad, rad, rad\] without having been seen to.
+    pub fn go_unseen(&mut self, agent: u32, sd: &Vector6<f64>) {
+        if let Some(track) = self.track_mut(agent) {
             track.since.inflate(&sd.component_mul(sd));
         }
         if let Some(meanwhile) = &mut self.meanwhile {

@@ -11,8 +11,6 @@ use state::{CorruptState, State, StateReader, StateWriter, state_of_struct};
 /// What has come since a relaxation began, of the graph as it was then.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Meanwhile {
-    /// Views that the relaxation matches.
-    views: u32,
     /// Records.
     records: u32,
     /// What agents have done, by number.
@@ -45,14 +43,6 @@ impl Default for AgentSince {
 }
 
 impl Meanwhile {
-    /// Of a relaxation that matches so many views.
-    pub(super) fn with_views(views: usize) -> Self {
-        Self {
-            views: u32::try_from(views).unwrap_or(u32::MAX),
-            ..Self::default()
-        }
-    }
-
     /// Counts a record of an agent, with its stamp.
     pub(super) fn note(&mut self, agent: u32, stamp_ns: i64) {
         self.records = self.records.saturating_add(1);
@@ -66,9 +56,8 @@ impl Meanwhile {
     pub(super) fn is_over(&self, agent: u32, stamp_ns: i64, n_keyframes: usize) -> bool {
         let first_ns = self.agents.get(&agent).and_then(|since| since.first_ns);
         let passed_ns = first_ns.map_or(0, |first_ns| stamp_ns.saturating_sub(first_ns));
-        let by_keyframes = n_keyframes as f64 / f64::from(tuning::RELAXED_IN_TIME);
-        let by_views = (f64::from(self.views) / f64::from(tuning::MATCHED_IN_TIME)).sqrt();
-        let longer = by_keyframes.max(by_views).max(1.0);
+        let longer = n_keyframes as f64 / f64::from(tuning::RELAXED_IN_TIME);
+        let longer = longer.max(1.0);
         passed_ns as f64 >= longer * tuning::RELAXATION_DELAY_NS as f64
             || f64::from(self.records) >= longer * f64::from(tuning::RELAXATION_RECORDS_MAX)
     }
@@ -106,7 +95,6 @@ impl Meanwhile {
 
 impl State for Meanwhile {
     fn write(&self, out: &mut StateWriter) {
-        self.views.write(out);
         self.records.write(out);
         let count = u32::try_from(self.agents.len()).expect("agents are numbered by u32");
         count.write(out);
@@ -120,13 +108,11 @@ impl State for Meanwhile {
     }
 
     fn read(input: &mut StateReader<'_>) -> Result<Self, CorruptState> {
-        let views = State::read(input)?;
         let records = State::read(input)?;
         let agents: Vec<(u32, AgentSince)> = State::read(input)?;
         let keyframes: Vec<u32> = State::read(input)?;
         let constraints: Vec<u32> = State::read(input)?;
         Ok(Self {
-            views,
             records,
             agents: agents.into_iter().collect(),
             keyframes: keyframes.into_iter().collect(),

@@ -129,11 +129,6 @@ pub(super) const RELAXATION_RECORDS_MAX: u32 = 4096;
 /// Keyframes up to which these two hold; with more both are longer in proportion.
 pub(super) const RELAXED_IN_TIME: u32 = 10_000;
 
-/// Views up to which they hold where views are matched; with more both are longer by the root of
-/// their number. On a quiet machine 370 views of real sensors were matched in up to 0.9 s, and
-/// 1,000 to 3,000 in up to 1.6 s: a third to a half of what they are given.
-pub(super) const MATCHED_IN_TIME: u32 = 25;
-
 /// Keyframes that move with one record, once a relaxation is in force: about 0.2 ms.
 pub(super) const KEYFRAMES_MOVED_PER_RECORD: usize = 1024;
 

@@ -209,6 +209,65 @@ fn an_agent_becomes_uncertain_and_then_lost() {
     assert_eq!(seen, [Status::Localized, Status::Uncertain, Status::Lost]);
 }
 
+/// Standard deviations of the position and of the heading.
+fn sd(map: &CognitiveMap, robot: &Robot) -> (f64, f64) {
+    let covariance = map.covariance(robot.id).unwrap();
+    (
+        covariance.position_sd_m(),
+        covariance.matrix()[(5, 5)].sqrt(),
+    )
+}
+
+/// Who knows that samples are lost does not claim to know where the robot went with them.
+#[test]
+fn where_lost_samples_led_is_not_known() {
+    let after = |lost: u64, step_m: f64, turn_rad: f64| {
+        let (mut map, mut robot) = new_map();
+        robot.sample(&mut map, start_pose([0.0; 3], [0.0; 3]));
+        for _ in 0..19 {
+            robot.go(&mut map, [step_m, 0.0, 0.0], [0.0, 0.0, turn_rad]);
+        }
+        robot.seq += lost;
+        robot.go(&mut map, [step_m, 0.0, 0.0], [0.0, 0.0, turn_rad]);
+        (map.status(robot.id).unwrap(), sd(&map, &robot))
+    };
+    let (status, (without_m, without_rad)) = after(0, 0.1, 0.0);
+    assert_eq!(status, Status::Localized);
+    // Ten lost steps of 0.1 m, whichever way.
+    let (status, (some_m, some_rad)) = after(10, 0.1, 0.0);
+    assert_eq!(status, Status::Uncertain);
+    assert!((0.9..2.0).contains(&some_m), "{some_m} after {without_m}");
+    assert!(some_rad < without_rad + 0.05, "it never turned: {some_rad}");
+    let (status, _) = after(3000, 0.1, 0.0);
+    assert_eq!(status, Status::Lost);
+    // One that turns on the spot is where it was, and heads anywhere.
+    let (_, (still_m, any_rad)) = after(100, 0.0, 0.1);
+    assert!(any_rad > 2.5 && still_m < 0.1, "{still_m} {any_rad}");
+    // One that has not moved has not moved.
+    let (stood, stood_still) = (after(3000, 0.0, 0.0), after(0, 0.0, 0.0));
+    assert_eq!(stood, stood_still);
+}
+
+/// A landmark that it knows tells a robot where it came to meanwhile.
+#[test]
+fn a_landmark_tells_where_lost_samples_led() {
+    let (mut map, mut robot) = new_map();
+    robot.sample(&mut map, start_pose([0.0; 3], [0.0; 3]));
+    for (label, at) in [("gate", [5.0, 3.0, 0.0]), ("post", [5.0, -3.0, 0.0])] {
+        robot.sample(&mut map, sighting(label, at, 0.05));
+    }
+    for _ in 0..19 {
+        robot.go(&mut map, [0.1, 0.0, 0.0], [0.0; 3]);
+    }
+    robot.seq += 20;
+    for (label, at) in [("gate", [1.1, 3.0, 0.0]), ("post", [1.1, -3.0, 0.0])] {
+        robot.sample(&mut map, sighting(label, at, 0.05));
+    }
+    let at = map.agent(robot.id).unwrap().pose().translation.vector;
+    assert!((at - Vector3::new(3.9, 0.0, 0.0)).norm() < 0.2, "{at}");
+    assert_eq!(map.status(robot.id), Some(Status::Localized));
+}
+
 #[test]
 fn latest_movements_are_told() {
     let (mut map, mut robot) = new_map();

@@ -216,36 +216,6 @@ fn a_restart_while_views_are_matched_makes_no_difference() {
     }
 }
 
-/// Whoever matches views beside the map has the longer for it the more they are: a tenth of a second
-/// of the stream for the root of their number.
-#[test]
-fn more_views_have_longer_to_be_matched() {
-    let (mut map, mut events) = (CognitiveMap::new(Settings::default()), Vec::new());
-    let mut begun: Option<(u64, i64, usize)> = None;
-    let mut waits = Vec::new();
-    for record in &drive(Views::Hall, 3.0).records {
-        map.apply(record, &mut events);
-        let Record::Sample { sample, .. } = record else {
-            continue;
-        };
-        let now = map.relaxation().map(cognitive_map::RelaxationJob::revision);
-        if begun.map(|(revision, ..)| revision) != now {
-            waits.extend(begun.map(|(_, begin_ns, views)| {
-                let waited_s = (sample.stamp_ns - begin_ns) as f64 * 1e-9;
-                (views, waited_s)
-            }));
-            let views = map.view_channels().map(|channel| channel.views).sum();
-            begun = now.map(|revision| (revision, sample.stamp_ns, views));
-        }
-    }
-    assert!(waits.iter().any(|(views, _)| *views > 300), "{waits:?}");
-    let enough = |(views, waited_s): &(usize, f64)| {
-        let given_s = 0.1 * (*views as f64).sqrt();
-        (given_s..=given_s + 1.0).contains(waited_s)
-    };
-    assert!(waits.iter().all(enough), "{waits:?}");
-}
-
 /// What a map has learned of the only channel of a drive.
 fn learned(views: Views) -> Option<LearnedChannel> {
     let (mut map, mut events) = (CognitiveMap::new(Settings::default()), Vec::new());

@@ -142,11 +142,6 @@ impl ViewLog {
         own.map(|view| view.sample)
     }
 
-    /// How many views it has.
-    pub fn len(&self) -> usize {
-        self.views.len()
-    }
-
     /// Whether there is nothing in it.
     pub fn is_empty(&self) -> bool {
         self.views.len() == 0

@@ -183,6 +183,27 @@ fn lasted_s(team: &Team) -> f64 {
 }
 
 impl Report {
+    /// What samples and relaxations took, as text.
+    fn print_times(&self) -> anyhow::Result<()> {
+        if let Some(timing) = self.update_ms {
+            let factor = self.real_time_factor;
+            let factor = factor.map_or(String::new(), |x| format!("{x:.0} times real time; "));
+            output::line(&format!(
+                "{factor}a sample p50 {:.1} us, p99 {:.1} us, max {:.1} ms",
+                timing.p50 * 1e3,
+                timing.p99 * 1e3,
+                timing.max,
+            ))?;
+        }
+        if let Some(timing) = self.relaxation_ms {
+            output::line(&format!(
+                "{} relaxations of the past beside them, p50 {:.1} ms, max {:.1} ms",
+                timing.count, timing.p50, timing.max,
+            ))?;
+        }
+        Ok(())
+    }
+
     /// As text.
     pub(super) fn print(&self) -> anyhow::Result<()> {
         let settings = self
@@ -220,22 +241,7 @@ impl Report {
                 nees.x, nees.y
             ))?;
         }
-        if let Some(timing) = self.update_ms {
-            let factor = self.real_time_factor;
-            let factor = factor.map_or(String::new(), |x| format!("{x:.0} times real time; "));
-            output::line(&format!(
-                "{factor}a sample p50 {:.1} us, p99 {:.1} us, max {:.1} ms",
-                timing.p50 * 1e3,
-                timing.p99 * 1e3,
-                timing.max,
-            ))?;
-        }
-        if let Some(timing) = self.relaxation_ms {
-            output::line(&format!(
-                "{} relaxations of the past beside them, p50 {:.1} ms, max {:.1} ms",
-                timing.count, timing.p50, timing.max,
-            ))?;
-        }
+        self.print_times()?;
         let closures = self
             .closures
             .map_or(String::new(), |n| format!("{n} closures, "));

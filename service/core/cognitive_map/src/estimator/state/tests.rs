@@ -57,7 +57,7 @@ fn apply(
         0 => {
             estimator.found(agent);
         }
-        1 => estimator.restart(agent, &Vector6::repeat(x)),
+        1 => estimator.go_unseen(agent, &Vector6::repeat(x)),
         2 => {
             let noise = PoseNoise::new([0.1; 3], [0.1; 3]).unwrap();
             let start = StartPose::new([3.0 * x, y, z], [0.0, 0.0, 0.0, 1.0], noise);
