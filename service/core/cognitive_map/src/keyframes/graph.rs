@@ -213,7 +213,7 @@ impl KeyframeGraph {
         self.go_unseen(agent, sd);
     }
 
-    /// An agent may have moved by about `sd` \[m, m, m, rad, rad, rad\] without having been seen to.
+    /// An agent may have moved by about `sd` \[m, m, m, rad, rad, rad\] unseen.
     pub fn go_unseen(&mut self, agent: u32, sd: &Vector6<f64>) {
         if let Some(track) = self.track_mut(agent) {
             track.since.inflate(&sd.component_mul(sd));
