@@ -28,6 +28,8 @@ pub(crate) struct Announced {
     pub(super) travelled_m: f64,
     /// Sum of its turns, whichever way \[rad\].
     turned_rad: f64,
+    /// Samples that were lost.
+    lost: u64,
     /// What became of its sightings.
     evidence: Evidence,
 }
@@ -41,6 +43,7 @@ state_of_struct!(Announced {
     before_latest,
     travelled_m,
     turned_rad,
+    lost,
     evidence,
 });
 
@@ -57,6 +60,7 @@ impl Announced {
             before_latest: None,
             travelled_m: 0.0,
             turned_rad: 0.0,
+            lost: 0,
             evidence: Evidence::default(),
         }
     }
@@ -141,12 +145,15 @@ impl Announced {
         self.before_latest = None;
         self.travelled_m = 0.0;
         self.turned_rad = 0.0;
+        self.lost = 0;
     }
 
-    /// How far it goes and turns on average with each of so many samples of its session
-    /// \[m, rad\].
-    pub(crate) fn movement_per_sample(&self, samples: u64) -> (f64, f64) {
-        let share = 1.0 / samples.max(1) as f64;
-        (self.travelled_m * share, self.turned_rad * share)
+    /// So many samples are lost, after `before` of its session. Answers how far it goes and turns
+    /// with as many on average \[m, rad\].
+    pub(crate) fn lose(&mut self, samples: u64, before: u64) -> (f64, f64) {
+        let came = before.saturating_sub(self.lost).max(1);
+        self.lost = self.lost.saturating_add(samples);
+        let part = samples as f64 / came as f64;
+        (self.travelled_m * part, self.turned_rad * part)
     }
 }

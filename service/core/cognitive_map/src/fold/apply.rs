@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Vector6};
 
-use super::tuning::UNSEEN_TURN_SD_MAX_RAD;
+use super::tuning::{KIDNAPPED_SD, UNSEEN_TURN_SD_MAX_RAD};
 use crate::agent::Agent;
 use crate::estimator::{Effect, Estimator};
 use crate::event::{Event, EventKind};
@@ -114,14 +114,12 @@ impl Fold<'_> {
     /// The agent went on with as many samples as are lost, after `before` of its session: as far as
     /// it goes on average, straight ahead or in any other way.
     fn go_unseen(&mut self, before: u64, lost: u64) {
-        let (way_m, turn_rad) = self.agent.announced.movement_per_sample(before);
-        let lost = lost as f64;
-        let sd_m = way_m * lost;
+        let (sd_m, turn_rad) = self.agent.announced.lose(lost, before);
         if self.agent.placed() && sd_m > self.settings.lost_sd_m {
             return self.lose_agent();
         }
-        let sd_m = sd_m.min(self.settings.lost_sd_m);
-        let sd_rad = (turn_rad * lost).min(UNSEEN_TURN_SD_MAX_RAD);
+        let sd_m = sd_m.min(KIDNAPPED_SD * self.settings.lost_sd_m);
+        let sd_rad = turn_rad.min(UNSEEN_TURN_SD_MAX_RAD);
         let is_planar = self.estimator.is_planar(self.agent_id.0);
         let sd = Vector6::from_fn(|k, _| match k {
             _ if is_planar && OUT_OF_PLANE.contains(&k) => 0.0,

@@ -60,8 +60,9 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// compasses, version 24 not what a turn of the body changes in views, version 25 no bias that is
 /// read at a stand and no evidence of places of beacons, version 26 not when claims were tried
 /// last, version 27 not who teaches levels, version 28 not who teaches views,
-/// version 29 not how a sensor's sightings repeat, version 30 not how far agents have turned.
-const VERSION: u16 = 31;
+/// version 29 not how a sensor's sightings repeat, version 30 not how far agents have turned,
+/// version 31 not how many of their samples are lost.
+const VERSION: u16 = 32;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

@@ -8,7 +8,7 @@ pub(super) const ANSWER_MIN: f64 = 0.5;
 /// Distance from where an agent was estimated to be from which on it did not drift there, in
 /// standard deviations of both poses. Source: three deviations.
 pub(super) const DRIFT_MAX: f64 = 3.0;
-/// Standard deviation of the position of an agent that was carried off, in the space's `lost_sd_m`.
+/// Standard deviation of the position of an agent that may be anywhere, in the space's `lost_sd_m`.
 /// Without a recorded measurement.
 pub(super) const KIDNAPPED_SD: f64 = 10.0;
 /// Standard deviation of what an agent turned by where nothing is known of it \[rad\]. Source: no

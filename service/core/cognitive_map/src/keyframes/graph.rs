@@ -200,6 +200,15 @@ impl KeyframeGraph {
     /// Begins a session of an agent, which may have been moved by about `sd` \[m, m, m, rad, rad,
     /// rad\] since its latest sample.
     pub fn restart(&mut self, agent: u32, sd: &Vector6<f64>) {
+        self.go_unseen(agent, sd);
+        if let Some(track) = self.track_mut(agent) {
+            track.session += 1;
+        }
+    }
+
+    /// An agent may have moved by about `sd` \[m, m, m, rad, rad, rad\] unseen: what it did before
+    /// is known as well as ever, and what it sees from now on is seen from elsewhere.
+    pub fn go_unseen(&mut self, agent: u32, sd: &Vector6<f64>) {
         let Some(track) = self.chains.track(agent) else {
             return;
         };
@@ -207,15 +216,7 @@ impl KeyframeGraph {
             self.add_keyframe(agent);
         }
         if let Some(track) = self.track_mut(agent) {
-            track.session += 1;
             track.needs_keyframe = true;
-        }
-        self.go_unseen(agent, sd);
-    }
-
-    /// An agent may have moved by about `sd` \[m, m, m, rad, rad, rad\] unseen.
-    pub fn go_unseen(&mut self, agent: u32, sd: &Vector6<f64>) {
-        if let Some(track) = self.track_mut(agent) {
             track.since.inflate(&sd.component_mul(sd));
         }
         if let Some(meanwhile) = &mut self.meanwhile {

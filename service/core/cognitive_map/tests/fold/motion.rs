@@ -240,6 +240,17 @@ fn where_lost_samples_led_is_not_known() {
     assert!(some_rad < without_rad + 0.05, "it never turned: {some_rad}");
     let (status, _) = after(3000, 0.1, 0.0);
     assert_eq!(status, Status::Lost);
+    let (mut map, mut robot) = new_map();
+    robot.sample(&mut map, start_pose([0.0; 3], [0.0; 3]));
+    // What is lost once more is no less far for what was lost before.
+    for lost in [40, 40] {
+        robot.sample(&mut map, start_pose([0.0; 3], [0.0; 3]));
+        robot.ahead(&mut map, 0.1, 19);
+        robot.seq += lost;
+        robot.ahead(&mut map, 0.1, 1);
+        let (now_m, _) = sd(&map, &robot);
+        assert!(now_m > 3.0, "{now_m}");
+    }
     // One that turns on the spot is where it was, and heads anywhere.
     let (_, (still_m, any_rad)) = after(100, 0.0, 0.1);
     assert!(any_rad > 2.5 && still_m < 0.1, "{still_m} {any_rad}");
@@ -251,21 +262,34 @@ fn where_lost_samples_led_is_not_known() {
 /// A landmark that it knows tells a robot where it came to meanwhile.
 #[test]
 fn a_landmark_tells_where_lost_samples_led() {
-    let (mut map, mut robot) = new_map();
-    robot.sample(&mut map, start_pose([0.0; 3], [0.0; 3]));
-    for (label, at) in [("gate", [5.0, 3.0, 0.0]), ("post", [5.0, -3.0, 0.0])] {
-        robot.sample(&mut map, sighting(label, at, 0.05));
+    // Some metres, and so far that it may be anywhere.
+    for (lost, to_m) in [(20, 3.9), (400, 12.0)] {
+        let (mut map, mut robot) = new_map();
+        robot.sample(&mut map, start_pose([0.0; 3], [0.0; 3]));
+        let posts = [
+            ("gate", [5.0, 3.0]),
+            ("post", [5.0, -3.0]),
+            ("pole", [2.0, 4.0]),
+        ];
+        let look = |map: &mut CognitiveMap, robot: &mut Robot, from_m: f64| {
+            for (label, at) in posts {
+                robot.sample(map, sighting(label, [at[0] - from_m, at[1], 0.0], 0.05));
+            }
+        };
+        look(&mut map, &mut robot, 0.0);
+        robot.ahead(&mut map, 0.1, 19);
+        robot.seq += lost;
+        for _ in 0..5 {
+            look(&mut map, &mut robot, to_m);
+            robot.go(&mut map, [0.0; 3], [0.0; 3]);
+        }
+        let at = map.agent(robot.id).unwrap().pose().translation.vector;
+        assert!(
+            (at - Vector3::new(to_m, 0.0, 0.0)).norm() < 0.2,
+            "{lost}: {at}"
+        );
+        assert_eq!(map.status(robot.id), Some(Status::Localized), "{lost}");
     }
-    for _ in 0..19 {
-        robot.go(&mut map, [0.1, 0.0, 0.0], [0.0; 3]);
-    }
-    robot.seq += 20;
-    for (label, at) in [("gate", [1.1, 3.0, 0.0]), ("post", [1.1, -3.0, 0.0])] {
-        robot.sample(&mut map, sighting(label, at, 0.05));
-    }
-    let at = map.agent(robot.id).unwrap().pose().translation.vector;
-    assert!((at - Vector3::new(3.9, 0.0, 0.0)).norm() < 0.2, "{at}");
-    assert_eq!(map.status(robot.id), Some(Status::Localized));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! A replay straight into the core.
 //!
-//! The past is relaxed between two samples, as soon as a relaxation begins: a service has threads
-//! for it, and its writer waits only where the robots' samples are faster than they are.
+//! The past is relaxed between two samples, as soon as a relaxation begins, and is timed apart: a
+//! service has threads for it. Its writer waits for one only where the outcome is needed sooner.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
