@@ -23,5 +23,5 @@ pub use planar::{
 };
 pub use positive::positive;
 pub use rotation::{planar_procrustes, procrustes, rotation_from_xyzw};
-pub use se3_jacobian::log_jacobian;
+pub use se3_jacobian::{exp_jacobian, log_jacobian};
 pub use symmetric::{from_upper_triangle, symmetric};

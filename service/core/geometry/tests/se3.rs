@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use geometry::{log_jacobian, se3};
+use geometry::{exp_jacobian, log_jacobian, se3};
 use nalgebra::{Isometry3, Matrix4, Vector3};
 use proptest::prelude::*;
 
@@ -183,5 +183,34 @@ proptest! {
             let error = (quotient - jacobian.column(axis)).norm();
             prop_assert!(error < 1e-7 * (1.0 + quotient.norm()), "{axis}: {error}");
         }
+    }
+
+    /// Also beyond half a turn, where the logarithm is another twist.
+    #[test]
+    fn the_jacobian_of_exp_is_its_difference_quotient(
+        linear in vector(10.0),
+        angular in vector(5.0),
+    ) {
+        let jacobian = exp_jacobian(&linear, &angular);
+        let back = se3::exp(&linear, &angular).inverse();
+        for axis in 0..6 {
+            let step = 1e-5;
+            let moved = |share: f64| {
+                let mut twist = se3::join(&linear, &angular);
+                twist[axis] += share;
+                let (linear, angular) = se3::split(&twist);
+                se3::twist(&(back * se3::exp(&linear, &angular)))
+            };
+            let quotient = (moved(step) - moved(-step)) / (2.0 * step);
+            let error = (quotient - jacobian.column(axis)).norm();
+            prop_assert!(error < 1e-7 * (1.0 + quotient.norm()), "{axis}: {error}");
+        }
+    }
+
+    #[test]
+    fn the_jacobians_of_log_and_exp_are_inverse(linear in vector(10.0), angular in angular()) {
+        let product = log_jacobian(&linear, &angular) * exp_jacobian(&linear, &angular);
+        let error = (product - nalgebra::Matrix6::identity()).norm();
+        prop_assert!(error < 1e-11 * (1.0 + linear.norm()), "{error}");
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
-use geometry::{log_jacobian, se3};
+use geometry::{exp_jacobian, log_jacobian, se3};
 
 /// Lasting errors of a robot's odometry: readings are wrong by them again and again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -157,9 +157,7 @@ impl Reading {
         for k in 3..6 {
             by_twist[(k, k)] = self.moving_s;
         }
-        // Half a turn between two poses has no even motion; nothing is learned from it.
-        let right = log_jacobian(&linear, &angular).try_inverse();
-        se3::adjoint(&error.inverse()) * right.unwrap_or_else(Matrix6::zeros) * by_twist
+        se3::adjoint(&error.inverse()) * (exp_jacobian(&linear, &angular) * by_twist)
     }
 }
 

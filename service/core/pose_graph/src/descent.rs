@@ -16,6 +16,8 @@ pub(super) struct SteepestDescent {
     /// D².
     curvature: Vec<f64>,
     step: Vec<f64>,
+    /// sᵀ H s of that step.
+    step_curved: f64,
 }
 
 impl SteepestDescent {
@@ -47,6 +49,7 @@ impl SteepestDescent {
             gradient,
             curvature,
             step,
+            step_curved: stride * stride * curved,
         }
     }
 
@@ -61,41 +64,45 @@ impl SteepestDescent {
 
     /// The step within `radius` on the way along the steepest descent and then on to the `newton`
     /// step, and by how much it is expected to lower the cost.
-    pub(super) fn dogleg(
-        &self,
-        equations: &NormalEquations<'_>,
-        newton: &[f64],
-        radius: f64,
-    ) -> (Vec<f64>, f64) {
+    ///
+    /// Both are combinations δ = α s + β n. The `newton` step solves H n = −g, so what it is
+    /// expected to bring, −2 gᵀδ − δᵀ H δ, needs no product with H:
+    ///
+    /// ```text
+    /// −2 (α gᵀs + β gᵀn) − α² sᵀ H s + 2 α β gᵀs + β² gᵀn
+    /// ```
+    pub(super) fn dogleg(&self, newton: &[f64], radius: f64) -> (Vec<f64>, f64) {
+        let (alpha, beta) = self.shares(newton, radius);
+        let step = self.step.iter().zip(newton);
+        let step: Vec<f64> = step.map(|(s, n)| alpha * s + beta * n).collect();
+        let (along, along_newton) = (dot(&self.gradient, &self.step), dot(&self.gradient, newton));
+        let linear = alpha * along + beta * along_newton;
+        let curved = alpha * alpha * self.step_curved
+            - 2.0 * alpha * beta * along
+            - beta * beta * along_newton;
+        (step, -2.0 * linear - curved)
+    }
+
+    /// The shares α of the steepest descent and β of the `newton` step in a step of at most this
+    /// length.
+    fn shares(&self, newton: &[f64], radius: f64) -> (f64, f64) {
         let steepest_length = self.length(&self.step);
-        let step: Vec<f64> = if self.length(newton) <= radius {
-            newton.to_vec()
-        } else if steepest_length >= radius {
-            self.step
-                .iter()
-                .map(|along| along * (radius / steepest_length))
-                .collect()
-        } else {
-            // |D (s + β (n − s))|² = r², a quadratic equation for β in [0, 1].
-            let rest: Vec<f64> = newton.iter().zip(&self.step).map(|(n, s)| n - s).collect();
-            let weigh = |a: &[f64], b: &[f64]| -> f64 {
-                a.iter()
-                    .zip(b)
-                    .zip(&self.curvature)
-                    .map(|((a, b), c)| a * b * c)
-                    .sum()
-            };
-            let (square, mixed) = (weigh(&rest, &rest), weigh(&self.step, &rest));
-            let missing = radius * radius - steepest_length * steepest_length;
-            let share = missing / (mixed + (mixed * mixed + square * missing).sqrt());
-            self.step
-                .iter()
-                .zip(&rest)
-                .map(|(s, rest)| s + share * rest)
-                .collect()
-        };
-        let expected = -2.0 * dot(&self.gradient, &step) - quadratic_form(equations, &step);
-        (step, expected)
+        if self.length(newton) <= radius {
+            return (0.0, 1.0);
+        }
+        if steepest_length >= radius {
+            return (radius / steepest_length, 0.0);
+        }
+        // |D (s + β (n − s))|² = r², a quadratic equation for β in [0, 1].
+        let (mut square, mut mixed) = (0.0, 0.0);
+        for ((s, n), c) in self.step.iter().zip(newton).zip(&self.curvature) {
+            let rest = n - s;
+            square += rest * rest * c;
+            mixed += s * rest * c;
+        }
+        let missing = radius * radius - steepest_length * steepest_length;
+        let beta = missing / (mixed + (mixed * mixed + square * missing).sqrt());
+        (1.0 - beta, beta)
     }
 }
 

@@ -1,6 +1,5 @@
 //! The normal equations of a whole graph.
 
-use std::borrow::Cow;
 use std::cell::OnceCell;
 
 use nalgebra::Isometry3;
@@ -37,27 +36,7 @@ impl Equations for NormalEquations<'_> {
     }
 
     fn add(&self, link: u32, front: &mut Front<'_>) {
-        let Some(blocks) = self.blocks(link) else {
-            return;
-        };
-        let (from, to) = self.map.links[link as usize].link.nodes();
-        let axes = |node: u32| self.map.nodes[node as usize].axes();
-        let (from, to) = ((from, axes(from)), (to, axes(to)));
-        front.add(to, to, &blocks.to_to);
-        front.add_right(to.0, to.1, 0, (-blocks.to_gradient).as_slice());
-        if from.0 != to.0 {
-            front.add(from, from, &blocks.from_from);
-            front.add(to, from, &blocks.to_from);
-            front.add_right(from.0, from.1, 0, (-blocks.from_gradient).as_slice());
-        }
-        let calibration = self.map.links[link as usize].link.calibration();
-        if let Some((node, blocks)) = calibration.zip(blocks.by_calibration.as_ref()) {
-            let own = (node, axes(node));
-            front.add(own, own, &blocks.own);
-            front.add(from, own, &blocks.from);
-            front.add(to, own, &blocks.to);
-            front.add_right(own.0, own.1, 0, (-blocks.gradient).as_slice());
-        }
+        self.with_blocks(link, |blocks| self.add_blocks(link, blocks, front));
     }
 }
 
@@ -72,6 +51,27 @@ impl<'a> NormalEquations<'a> {
         }
     }
 
+    fn add_blocks(&self, link: u32, blocks: &NormalBlocks, front: &mut Front<'_>) {
+        let link = &self.map.links[link as usize].link;
+        let (from, to) = link.nodes();
+        let axes = |node: u32| self.map.nodes[node as usize].axes();
+        let (from, to) = ((from, axes(from)), (to, axes(to)));
+        front.add(to, to, &blocks.to_to);
+        front.add_right(to.0, to.1, 0, (-blocks.to_gradient).as_slice());
+        if from.0 != to.0 {
+            front.add(from, from, &blocks.from_from);
+            front.add(to, from, &blocks.to_from);
+            front.add_right(from.0, from.1, 0, (-blocks.from_gradient).as_slice());
+        }
+        if let Some((node, blocks)) = link.calibration().zip(blocks.by_calibration.as_ref()) {
+            let own = (node, axes(node));
+            front.add(own, own, &blocks.own);
+            front.add(from, own, &blocks.from);
+            front.add(to, own, &blocks.to);
+            front.add_right(own.0, own.1, 0, (-blocks.gradient).as_slice());
+        }
+    }
+
     /// Linearises all links once, for what goes through them several times.
     pub(super) fn keep(&self) {
         let all = || {
@@ -81,32 +81,32 @@ impl<'a> NormalEquations<'a> {
         self.kept.get_or_init(all);
     }
 
-    /// The blocks of a link; `None` if it is switched off.
-    fn blocks(&self, link: u32) -> Option<Cow<'_, NormalBlocks>> {
+    /// Hands out the blocks of a link, unless it is switched off.
+    fn with_blocks(&self, link: u32, each: impl FnOnce(&NormalBlocks)) {
         match self.kept.get() {
-            Some(kept) => kept[link as usize].as_ref().map(Cow::Borrowed),
-            None => self.linearised(link).map(Cow::Owned),
-        }
+            Some(kept) => kept[link as usize].as_ref().map(each),
+            None => self.linearised(link).as_ref().map(each),
+        };
     }
 
+    /// The blocks of a link; `None` if it is switched off.
     fn linearised(&self, link: u32) -> Option<NormalBlocks> {
         let slot = &self.map.links[link as usize];
-        let blocks = || {
-            let weigh = |s| slot.kernel.cost_and_weight(s, self.widening).1;
-            slot.link
-                .normal_blocks(|node| &self.poses[node as usize], weigh)
-        };
-        slot.is_on.then(blocks)
+        if !slot.is_on {
+            return None;
+        }
+        let weigh = |s| slot.kernel.cost_and_weight(s, self.widening).1;
+        let place = |node: u32| &self.poses[node as usize];
+        Some(slot.link.normal_blocks(place, weigh))
     }
 
     /// Hands out the nodes and the blocks of every link that is on; and the node of its
     /// calibration, if it has one.
     pub(super) fn for_each_link(&self, mut each: impl FnMut([u32; 2], Option<u32>, &NormalBlocks)) {
         for (link, slot) in (0..).zip(&self.map.links) {
-            if let Some(blocks) = self.blocks(link) {
-                let (from, to) = slot.link.nodes();
-                each([from, to], slot.link.calibration(), &blocks);
-            }
+            let (from, to) = slot.link.nodes();
+            let calibration = slot.link.calibration();
+            self.with_blocks(link, |blocks| each([from, to], calibration, blocks));
         }
     }
 }

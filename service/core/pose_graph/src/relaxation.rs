@@ -112,6 +112,7 @@ impl PoseGraph {
         let mut descent = Descent {
             map: self,
             tree: &mut tree,
+            cost: self.cost(|node| &poses[node as usize], widening),
             poses,
             widening,
             radius: f64::INFINITY,
@@ -126,7 +127,7 @@ impl PoseGraph {
             if is_final && step.decrease <= 0.0 {
                 break;
             }
-            descent.widening = (descent.widening / NARROWING).max(1.0);
+            descent.narrow();
         }
         let poses = descent.poses;
         report.chi_squared = self.cost(|node| &poses[node as usize], 1.0);
@@ -156,6 +157,8 @@ struct Descent<'a> {
     tree: &'a mut CliqueTree,
     poses: Vec<Isometry3<f64>>,
     widening: f64,
+    /// At these poses, with kernels so wide.
+    cost: f64,
     /// Of the region of trust, in units in which every unknown alone has the same curvature.
     radius: f64,
 }
@@ -172,6 +175,15 @@ struct Step {
 }
 
 impl Descent<'_> {
+    /// Narrows kernels that are wide.
+    fn narrow(&mut self) {
+        if self.widening > 1.0 {
+            self.widening = (self.widening / NARROWING).max(1.0);
+            let pose = |node: u32| &self.poses[node as usize];
+            self.cost = self.map.cost(pose, self.widening);
+        }
+    }
+
     /// Solves the normal equations once, and goes as far as the cost sinks.
     fn step(&mut self) -> Step {
         let equations = NormalEquations::new(self.map, &self.poses, self.widening);
@@ -180,11 +192,8 @@ impl Descent<'_> {
         }
         let n_undetermined = self.tree.refactor(&equations, &self.tree.all());
         let newton = self.tree.solve();
-        let cost = self
-            .map
-            .cost(|node| &self.poses[node as usize], self.widening);
         let mut step = Step {
-            cost,
+            cost: self.cost,
             expected: self.tree.explained(),
             decrease: 0.0,
             n_undetermined,
@@ -198,10 +207,11 @@ impl Descent<'_> {
         for _ in 0..TRIALS_MAX {
             let (tried, expected) = match &descent {
                 None => (newton.clone(), step.expected),
-                Some(descent) => descent.dogleg(&equations, &newton, self.radius),
+                Some(descent) => descent.dogleg(&newton, self.radius),
             };
             let next = self.moved(&tried);
-            let decrease = cost - self.map.cost(|node| &next[node as usize], self.widening);
+            let cost = self.map.cost(|node| &next[node as usize], self.widening);
+            let decrease = self.cost - cost;
             let length = descent
                 .as_ref()
                 .map(|descent: &SteepestDescent| descent.length(&tried));
@@ -214,7 +224,7 @@ impl Descent<'_> {
             }
             if decrease > 0.0 {
                 step.decrease = decrease;
-                self.poses = next;
+                (self.poses, self.cost) = (next, cost);
                 break;
             }
             if descent.is_none() {
