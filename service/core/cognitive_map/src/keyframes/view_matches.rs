@@ -9,6 +9,7 @@ use place_recognition::{SampleKey, Similarity, ViewLog, ViewMatch};
 use super::agent_track::AgentTrack;
 use super::chains::Chains;
 use super::graph::KeyframeGraph;
+use super::keyframe::Keyframe;
 use super::matching::{Matching, ViewMatches};
 use super::problem::{Among, Calibrating, Problem};
 use super::relaxation::RelaxationCopy;
@@ -78,9 +79,8 @@ impl RelaxationCopy {
                 best = as_before;
             }
         }
-        let by_odometry = { matching.veers.iter() }.map(|&veer| thinned.dead_reckoned(veer));
-        for start in std::iter::once(thinned.clone()).chain(by_odometry) {
-            let other = start.matched(matching.widths, &channels);
+        for start in thinned.starts(matching, &channels, range_m, 2.0 * another_map) {
+            let other = start.gated(&channels);
             if other.log_probability > needed.max(best.log_probability) {
                 best = other;
             }
@@ -99,22 +99,30 @@ impl RelaxationCopy {
         self.graph().matches != held
     }
 
-    /// A copy relaxed by matches that were found wherever its keyframes are, and then, twice, by
-    /// those near to where it has them.
-    fn matched(&self, widths: &[f64], channels: &[Similarity<'_>]) -> Matched {
-        let all: Vec<ViewMatch> = channels.iter().flat_map(Similarity::matches).collect();
-        let mut matched = self.with_matches(all.into(), widths, channels);
-        for _ in 0..tuning::GATED_MATCHINGS {
-            let graph = matched.copy.graph();
-            let near = |channel: &Similarity<'_>| channel.matches_near(&positions(graph, channel));
-            let near: Vec<ViewMatch> = channels.iter().flat_map(near).collect();
-            if near.is_empty() {
-                break;
+    /// Copies relaxed by matches that were found wherever their keyframes are, from where they are
+    /// now and where they would be by odometry with each veer: those that are different maps, and
+    /// as probable as the best up to `margin_nats`.
+    fn starts(
+        &self,
+        matching: &Matching,
+        channels: &[Similarity<'_>],
+        range_m: f64,
+        margin_nats: f64,
+    ) -> Vec<Matched> {
+        let by_odometry = { matching.veers.iter() }.map(|&veer| self.dead_reckoned(veer));
+        let mut starts: Vec<Matched> = Vec::new();
+        for start in std::iter::once(self.clone()).chain(by_odometry) {
+            let all: Vec<ViewMatch> = channels.iter().flat_map(Similarity::matches).collect();
+            let start = start.with_matches(all.into(), matching.widths, channels);
+            let is_same = |other: &Matched| other.is_within(&start, tuning::MATCHED_STEP * range_m);
+            if !starts.iter().any(is_same) {
+                starts.push(start);
             }
-            let copy = matched.copy;
-            matched = copy.with_matches(near.into(), tuning::GATED_WIDTHS, channels);
         }
-        matched
+        let most = { starts.iter() }.map(|start| start.log_probability);
+        let most = most.fold(f64::NEG_INFINITY, f64::max);
+        starts.retain(|start| start.log_probability >= most - margin_nats);
+        starts
     }
 
     /// A copy relaxed by these matches, with kernels that become narrower and never less deep: a
@@ -167,6 +175,36 @@ impl RelaxationCopy {
 }
 
 impl Matched {
+    /// The same, relaxed twice by matches that are near to one another by it.
+    fn gated(self, channels: &[Similarity<'_>]) -> Self {
+        let mut matched = self;
+        for _ in 0..tuning::GATED_MATCHINGS {
+            let graph = matched.copy.graph();
+            let near = |channel: &Similarity<'_>| channel.matches_near(&positions(graph, channel));
+            let near: Vec<ViewMatch> = channels.iter().flat_map(near).collect();
+            if near.is_empty() {
+                break;
+            }
+            let copy = matched.copy;
+            matched = copy.with_matches(near.into(), tuning::GATED_WIDTHS, channels);
+        }
+        matched
+    }
+
+    /// Whether no keyframe is farther from where another copy has it.
+    fn is_within(&self, other: &Self, distance_m: f64) -> bool {
+        let others = &other.copy.graph().chains.keyframes;
+        let keyframes = self.copy.graph().chains.keyframes.iter();
+        keyframes.into_iter().all(|(number, keyframe)| {
+            let apart = |other: &Keyframe| {
+                (keyframe.pose.translation.vector - other.pose.translation.vector).norm()
+            };
+            others
+                .get(number)
+                .is_some_and(|other| apart(other) <= distance_m)
+        })
+    }
+
     /// The same, relaxed by matches that are close to one another by it; `None` if it has none.
     fn matched_closely(&self, channels: &[Similarity<'_>]) -> Option<Self> {
         let graph = self.copy.graph();
