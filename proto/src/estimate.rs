@@ -33,18 +33,19 @@ pub struct Estimate {
     pub seq: u64,
     /// Stamp of that sample \[ns\].
     pub stamp_ns: i64,
-    /// Frame of the pose; always `map`.
+    /// Frame of the pose: `map`; or `odom` while the agent is lost and nothing ties it to the map,
+    /// a frame of its own that begins where it began to be lost.
     pub frame: String,
     /// Number of records that the map includes.
     pub map_revision: u64,
     /// How the agent is localised.
     pub status: Status,
-    /// Position in `map` \[m\].
+    /// Position in that frame \[m\].
     pub translation_m: [f64; 3],
-    /// Orientation in `map`, unit quaternion `[x, y, z, w]`.
+    /// Orientation in that frame, unit quaternion `[x, y, z, w]`.
     pub rotation_xyzw: [f64; 4],
     /// Upper triangle, row by row, of the 6 × 6 covariance of (x, y, z, rotation about x, y, z)
-    /// along the axes of `map` \[m², m·rad, rad²\].
+    /// along the axes of that frame \[m², m·rad, rad²\].
     pub covariance: [f64; 21],
     /// The place cell that answers strongest, if any does.
     pub place: Option<u64>,

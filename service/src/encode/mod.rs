@@ -53,3 +53,6 @@ pub use way_graph::{RouteGraph, graphml, nav2};
 
 /// Frame of all positions in answers.
 pub const FRAME: &str = "map";
+
+/// Frame of the estimate of an agent that nothing ties to the map.
+pub const OWN_FRAME: &str = "odom";

@@ -97,7 +97,8 @@ class Estimate(UncertainPoseReadings):
     seq: int
     #: Stamp of that sample [ns].
     stamp_ns: int
-    #: Frame of the pose; always `map`.
+    #: Frame of the pose: `map`; or `odom` while the agent is lost and nothing ties it to the map, a
+    #: frame of its own that begins where it began to be lost.
     frame: str
     #: Number of records that the map includes.
     map_revision: int
@@ -107,7 +108,7 @@ class Estimate(UncertainPoseReadings):
     #: Orientation, unit quaternion `[x, y, z, w]`.
     rotation_xyzw: Quaternion
     #: Upper triangle, row by row, of the 6 × 6 covariance of (x, y, z, rotation about x, y, z)
-    #: along the axes of `map`: 21 numbers [m², m·rad, rad²].
+    #: along the axes of that frame: 21 numbers [m², m·rad, rad²].
     covariance: Tuple[float, ...]
     #: The place cell that answers strongest, if any does.
     place: Optional[int] = None

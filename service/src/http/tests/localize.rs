@@ -196,3 +196,16 @@ async fn more_than_there_is_room_for_are_told_to_come_back() {
     rig.send(Method::POST, identify, JSON, touched).await.good();
     localized(&rig, &query).await;
 }
+
+#[tokio::test]
+async fn a_newcomer_is_in_a_frame_of_its_own() {
+    let rig = rig();
+    for agent in ["rover", "newcomer"] {
+        rig.samples(agent, &steps(1, 0, 3)).await.good();
+    }
+    for (agent, status, frame) in [("rover", "localized", "map"), ("newcomer", "lost", "odom")] {
+        let path = format!("/v1/spaces/lab/agents/{agent}");
+        let estimate = rig.get(&path).await.good()["estimate"].clone();
+        assert_eq!((&estimate["status"], &estimate["frame"]), (&status.into(), &frame.into()));
+    }
+}

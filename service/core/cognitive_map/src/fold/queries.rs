@@ -96,10 +96,16 @@ impl CognitiveMap {
         self.estimator.covariance(agent.0)
     }
 
+    /// Whether an agent's pose is one in the map. That of another one is in a frame of its own,
+    /// which begins where it began to be lost.
+    pub fn is_in_map(&self, agent: AgentId) -> bool {
+        self.estimator.is_in_map(agent.0)
+    }
+
     /// How well an agent is localised.
     pub fn status(&self, agent: AgentId) -> Option<Status> {
         let position_sd_m = self.covariance(agent)?.position_sd_m();
-        if !self.estimator.is_in_map(agent.0) {
+        if !self.is_in_map(agent) {
             return Some(Status::Lost);
         }
         Some(Status::of(
