@@ -127,6 +127,16 @@ def test_a_lost_batch_is_sent_again_when_the_watermark_names_the_gap(service: St
     assert firsts.count(0) == 1, "and what had arrived did not"
 
 
+def test_a_flush_behind_a_gap_says_what_the_service_waits_for(service: StandIn) -> None:
+    service.loses = lambda number: service.batches[number].first_seq == 0
+    with ada(service, batch_samples=10) as robot:
+        for value in range(20):
+            robot.level("n", value)
+        with pytest.raises(cogmap.Timeout, match="waits for samples 0 to 9, which are sent again"):
+            robot.flush(0.5)
+        service.loses = lambda number: False
+
+
 def test_silence_brings_back_what_no_gap_can_name(service: StandIn) -> None:
     service.loses = lambda number: number < 2
     with ada(service, batch_samples=10) as robot:

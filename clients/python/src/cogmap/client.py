@@ -43,10 +43,11 @@ from .object import (
 from .point_cloud import PointCloud
 from .query import MotionBody, PerceptCue, PredictQuery, RecallQuery
 from .questions import Questions
-from .request import json_of, path_of
+from .request import id_of, json_of, path_of
 from .retry import RETRY_TIMEOUT_S
 from .route import RouteReverse
 from .sample import NoTurn, Orientation, SampleBatch, TouchNoise
+from .scalar import listed, one_of
 from .settings import SpaceSettings
 from .sse import ServerSentEvent
 from .trajectory import StampedPose, Trajectory
@@ -177,6 +178,7 @@ class Client(Questions, GuidanceClient):
 
     def post_samples(self, space: str, agent: str, batch: SampleBatch) -> IngestAnswer:
         """Sends samples without Zenoh; returns when they are on the service's disk."""
+        one_of("batch", batch, (SampleBatch,))
         path = path_of(space, "agents", agent, "samples")
         return self._send(IngestAnswer, "POST", path, CBOR, encode(batch), repeatable=True)
 
@@ -203,7 +205,9 @@ class Client(Questions, GuidanceClient):
             position_m=None if position_m is None else vec3("position_m", position_m),
             code=None
             if code is None
-            else tuple(None if phase is None else vec3("code", phase) for phase in code),
+            else tuple(
+                None if phase is None else vec3("code", phase) for phase in listed("code", code)
+            ),
             radius_m=radius_m,
             agent=agent,
             since_ns=since_ns,
@@ -243,11 +247,11 @@ class Client(Questions, GuidanceClient):
 
     def place(self, space: str, place: int) -> Place:
         """A place."""
-        return self._get(Place, path_of(space, "places", str(place)))
+        return self._get(Place, path_of(space, "places", id_of("place", place)))
 
     def place_percepts(self, space: str, place: int) -> PlacePercepts:
         """What a place remembers of what was felt and seen there."""
-        return self._get(PlacePercepts, path_of(space, "places", str(place), "percepts"))
+        return self._get(PlacePercepts, path_of(space, "places", id_of("place", place), "percepts"))
 
     def trips(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Trip]:
         """All trips of a space, by id. `filters` are passed on as query parameters."""
@@ -261,7 +265,7 @@ class Client(Questions, GuidanceClient):
 
     def trip(self, space: str, trip: int) -> TripDetail:
         """A trip with its legs."""
-        return self._get(TripDetail, path_of(space, "trips", str(trip)))
+        return self._get(TripDetail, path_of(space, "trips", id_of("trip", trip)))
 
     def landmarks(self, space: str, **filters: Union[None, str, int, float]) -> Iterator[Landmark]:
         """All landmarks of a space, by label. `filters` are passed on as query parameters."""

@@ -14,8 +14,9 @@ from .guidance import (
     FollowRequest,
 )
 from .http_service import HttpService, Query
-from .request import json_of, path_of
+from .request import id_of, json_of, path_of
 from .route import RouteAvoid, RouteBox, RouteCost, RouteEnd, RouteReverse
+from .scalar import listed, one_of
 from .wire import JSON
 
 
@@ -36,7 +37,7 @@ class GuidanceClient(HttpService):
         """Lets an agent follow a route to `goal` from where it is, in place of any that it follows.
         Events tell its progress; when it leaves the route, or a blockage comes onto it, it gets
         another one."""
-        avoid = RouteAvoid(tuple(avoid_places), tuple(avoid_boxes))
+        avoid = RouteAvoid(listed("avoid_places", avoid_places), listed("avoid_boxes", avoid_boxes))
         request = FollowRequest(goal, cost, reverse, avoid)
         path = path_of(space, "agents", agent, "route")
         return self._send(FollowedRoute, "PUT", path, JSON, json_of("request", request))
@@ -66,17 +67,18 @@ class GuidanceClient(HttpService):
     def block(self, space: str, request: BlockageRequest) -> Blockage:
         """Says where nobody gets through: no route leads there until that is taken back, its time
         has come, or somebody travels there."""
+        one_of("request", request, (BlockageRequest,))
         path = path_of(space, "blockages")
         return self._send(Blockage, "POST", path, JSON, json_of("request", request))
 
     def unblock(self, space: str, blockage: int) -> None:
         """Ends a blockage."""
-        self._request("DELETE", path_of(space, "blockages", str(blockage)))
+        self._request("DELETE", path_of(space, "blockages", id_of("blockage", blockage)))
 
     def pin_trip(self, space: str, trip: int) -> None:
         """Pins a trip, which then is never forgotten."""
-        self._request("PUT", path_of(space, "trips", str(trip), "pin"))
+        self._request("PUT", path_of(space, "trips", id_of("trip", trip), "pin"))
 
     def unpin_trip(self, space: str, trip: int) -> None:
         """Lets a trip be forgotten like others."""
-        self._request("DELETE", path_of(space, "trips", str(trip), "pin"))
+        self._request("DELETE", path_of(space, "trips", id_of("trip", trip), "pin"))

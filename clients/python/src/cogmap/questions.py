@@ -19,6 +19,7 @@ from .route import (
     RouteReverse,
 )
 from .sample import Sample
+from .scalar import listed
 from .sequence import AnyElement, SequenceAnswer, SequenceQuery, element
 from .trajectory import AgentAt
 from .vector import Vec3
@@ -61,7 +62,9 @@ class Questions(HttpService):
             goal,
             cost=cost,
             reverse=reverse,
-            avoid=RouteAvoid(tuple(avoid_places), tuple(avoid_boxes)),
+            avoid=RouteAvoid(
+                listed("avoid_places", avoid_places), listed("avoid_boxes", avoid_boxes)
+            ),
             shortcuts=shortcuts,
             body_radius_m=body_radius_m,
             alternatives=alternatives,
@@ -84,7 +87,7 @@ class Questions(HttpService):
         places by number, or what was sensed there (`Level`, `Descriptor`), oldest first;
         `error_rate` of them are wrong, and `none_prior` says how likely nobody has travelled
         such a sequence. A service that is at several of these already asks to come back (503)."""
-        query = SequenceQuery(tuple(map(element, cue)), error_rate, none_prior, limit)
+        query = SequenceQuery(tuple(map(element, listed("cue", cue))), error_rate, none_prior, limit)
         path = path_of(space, "sequence")
         return self._send(SequenceAnswer, "POST", path, JSON, json_of("query", query))
 
@@ -101,7 +104,7 @@ class Questions(HttpService):
         """What was felt near a point [m] since a stamp, by what the places within `radius_m` of it
         remember, also of some `channels` only. That nobody looked (`Looked.NEVER`) is told from
         that somebody did and felt nothing."""
-        names = None if channels is None else tuple(channels)
+        names = None if channels is None else listed("channels", channels)
         query = FeltQuery(position_m, radius_m, since_ns, names, limit)
         path = path_of(space, "felt")
         return self._send(FeltAnswer, "POST", path, JSON, json_of("query", query))

@@ -8,7 +8,7 @@ import urllib.parse
 from typing import Any, Optional
 
 from .errors import InvalidValue
-from .scalar import text
+from .scalar import COUNT_RANGE, text, whole
 from .wire import to_wire
 
 
@@ -20,6 +20,11 @@ def path_of(*segments: str) -> str:
             raise InvalidValue("name", segment, "expected a name")
     quoted = (urllib.parse.quote(segment, safe="") for segment in segments)
     return "/".join(("/v1/spaces", *quoted))
+
+
+def id_of(name: str, number: int) -> str:
+    """The number of a memory, as it is in a path."""
+    return str(whole(name, number, COUNT_RANGE))
 
 
 def json_of(name: str, value: Any) -> bytes:

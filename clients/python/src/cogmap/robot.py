@@ -243,6 +243,9 @@ class Robot(Sampler):
     def estimate(self, timeout_s: float = 10.0, *, seq: Optional[int] = None) -> Estimate:
         """The latest estimate of this session; waits for the first one, then raises `Timeout`.
 
+        The first one comes of the first sample: before that the wait is for another thread to send
+        it.
+
         Args:
             timeout_s: Longest wait [s].
             seq: Waits for an estimate that includes this sample: the number that the sample's
@@ -287,10 +290,11 @@ class Robot(Sampler):
             run.end_session()
             run.closing = True
             run.changed.notify_all()
-        missing = 0
+        missing, silence = 0, ""
         try:
             if not run.is_own_thread() and not run.superseded_told:
                 missing = run.wait_durable(timeout_s)
+                silence = run.silence()
         finally:
             run.stop(0.0)
             if not run.join(leave_s):
@@ -298,7 +302,7 @@ class Robot(Sampler):
         if missing:
             raise Timeout(
                 f"closed with {missing} samples of agent {self.agent} that are not durable"
-                f"{run.silence()}"
+                f"{silence}"
             )
 
     def __enter__(self) -> Robot:

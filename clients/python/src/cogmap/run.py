@@ -16,7 +16,7 @@ from typing import Callable, Optional
 import zenoh
 
 from . import bounds
-from .answer import Estimate, Watermark
+from .answer import Estimate, SeqRange, Watermark
 from .clock import SessionClock
 from .connection import Connection
 from .ending import begins, has_ended
@@ -84,6 +84,8 @@ class Run:
         self._is_behind = False
         self.superseded_told = False
         self._superseded_by: Optional[int] = None
+        # What the service lacks, by its latest watermark.
+        self._gap: Optional[SeqRange] = None
         self._problem: Optional[Problem] = None
         self._ask_again_at = 0.0
         # What Zenoh says of its session once that is closed.
@@ -138,10 +140,8 @@ class Run:
 
     def silence(self) -> str:
         """Why nothing may come back, to be added to a message; empty if something has."""
-        silence = self.connection.silence()
-        if not silence and self.watermark is None and self.window.sent:
-            return bounds.UNHEARD
-        return silence
+        is_unheard = self.watermark is None
+        return self.connection.silence() or bounds.silence(self.window, self._gap, is_unheard)
 
     def append(
         self, body: SampleBody, stamp_ns: Optional[int], deadline: float, accepted: int
@@ -467,6 +467,7 @@ class Run:
                 # Two runs may share the number, so nobody knows which of them this is about.
                 return
             now = time.monotonic()
+            self._gap = watermark.gap
             gap = None if watermark.gap is None else (watermark.gap.start, watermark.gap.stop)
             durable, applied, term = watermark.durable, watermark.applied, watermark.term
             self.window.acknowledge(durable, applied, gap, now, term)

@@ -100,6 +100,13 @@ def counted(name: str, items: Tuple[_T, ...], most: int) -> Tuple[_T, ...]:
     return items
 
 
+def listed(name: str, items: Iterable[_T]) -> Tuple[_T, ...]:
+    """`items` as a tuple, if they are several; a text is one."""
+    if isinstance(items, (str, bytes)) or not isinstance(items, Iterable):
+        raise InvalidValue(name, items, "expected a list")
+    return tuple(items)
+
+
 def all_of(name: str, items: Iterable[object], kinds: Tuple[type, ...]) -> Tuple[Any, ...]:
     """`items` as a tuple, if each is one of `kinds`."""
     try:
