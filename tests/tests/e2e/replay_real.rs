@@ -207,6 +207,23 @@ fn a_set_that_cannot_be_read_is_named_after_the_others_were_measured() {
 }
 
 #[test]
+fn what_a_set_has_not_is_named() {
+    let home = TempDir::new().unwrap();
+    let lines = "0,a,level,light,1\n1,a,velocity,1,0,0.1,1\n";
+    write_set(home.path(), lines, "0,a,0,0,0,,\n1,a,1,0,0,,\n", &[]);
+    for (command, why) in [
+        (["csv", "--no", "lihgt"], "no such channel; it has light"),
+        (["sequences", "--taught", "b"], "no agent b; it has a"),
+        (["sequences", "--taught", "a"], "nobody is left to ask for"),
+    ] {
+        let [kind, flag, name] = command;
+        let finished = lab(&["replay", kind, text(home.path()), flag, name]);
+        assert_eq!(finished.code(), 1, "{finished:?}");
+        assert!(finished.stderr.contains(why), "{}", finished.stderr);
+    }
+}
+
+#[test]
 fn a_directory_without_a_set_is_named() {
     let home = TempDir::new().unwrap();
     fs::create_dir(home.path().join("empty")).unwrap();

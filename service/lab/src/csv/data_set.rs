@@ -1,15 +1,14 @@
 //! The tables of a set in memory.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-use cogmap_proto::Name;
 use nalgebra::{Isometry3, Vector3};
 use trajectory::{StampedPosition, Trajectory, parse_seconds};
 
 use super::error::{TableError, TableReason};
-use super::row::{Row, RowBody, number, require};
+use super::row::{Row, RowBody, name, number, require};
 use super::views::Views;
 
 /// A set: what each agent recorded, by its name, and the views.
@@ -74,7 +73,7 @@ impl TableSet {
             String::new()
         };
         let mut set = Self::read(&text("samples.csv")?, &truth)?;
-        for channel in set.channels() {
+        for channel in set.channels_of_views() {
             let file = directory.join(format!("{channel}.npy"));
             let shown = file.display().to_string();
             let bytes = fs::read(&file).map_err(|source| TableError::Io {
@@ -93,9 +92,9 @@ impl TableSet {
     /// A line makes no sense, or there is no sample.
     pub fn read(samples: &str, truth: &str) -> Result<Self, TableError> {
         let mut set = Self::default();
-        for_each_line("samples.csv", samples, |columns| {
+        for_each_line(("samples.csv", SAMPLES), samples, |columns| {
             let row = Row::read(columns)?;
-            let log = set.agents.entry(agent(columns)?).or_default();
+            let log = set.agents.entry(name(columns, 1)?).or_default();
             if log
                 .rows
                 .last()
@@ -110,9 +109,9 @@ impl TableSet {
             return Err(TableError::Empty);
         }
         let mut known: BTreeMap<String, (Vec<StampedPosition>, Option<f64>)> = BTreeMap::new();
-        for_each_line("truth.csv", truth, |columns| {
+        for_each_line(("truth.csv", TRUTH), truth, |columns| {
             require(columns, 6)?;
-            let (positions, heading_rad) = known.entry(agent(columns)?).or_default();
+            let (positions, heading_rad) = known.entry(name(columns, 1)?).or_default();
             // A height that is not told is that of the plane.
             let z = if columns[4].is_empty() {
                 0.0
@@ -142,8 +141,18 @@ impl TableSet {
         Ok(set)
     }
 
+    /// The channels of levels and views.
+    pub fn channels(&self) -> BTreeSet<&str> {
+        let rows = self.agents.values().flat_map(|log| &log.rows);
+        rows.filter_map(|row| match &row.body {
+            RowBody::Level(channel, _) | RowBody::Descriptor(channel, _) => Some(channel.as_str()),
+            _ => None,
+        })
+        .collect()
+    }
+
     /// The channels of which there are views.
-    fn channels(&self) -> Vec<String> {
+    fn channels_of_views(&self) -> Vec<String> {
         let rows = self.agents.values().flat_map(|log| &log.rows);
         let mut channels: Vec<String> = rows
             .filter_map(|row| match &row.body {
@@ -157,12 +166,27 @@ impl TableSet {
     }
 }
 
-/// Hands out the columns of each line but the first, which names them.
+/// Most characters of a header that an error shows.
+const HEADER_SHOWN: usize = 60;
+/// What the first line of `samples.csv` begins with.
+const SAMPLES: &str = "t_s,agent,kind";
+/// What that of `truth.csv` begins with.
+const TRUTH: &str = "t_s,agent,x,y,z,yaw";
+
+/// Hands out the columns of each line of a file but the first, which names them.
 fn for_each_line(
-    file: &str,
+    (file, header): (&str, &'static str),
     text: &str,
     mut each: impl FnMut(&[&str]) -> Result<(), TableReason>,
 ) -> Result<(), TableError> {
+    let first = text.lines().next();
+    if let Some(found) = first.filter(|first| !first.starts_with(header)) {
+        return Err(TableError::Header {
+            file: file.to_owned(),
+            expected: header,
+            found: found.chars().take(HEADER_SHOWN).collect(),
+        });
+    }
     for (index, line) in text.lines().enumerate().skip(1) {
         let columns: Vec<&str> = line.trim_end().split(',').collect();
         each(&columns).map_err(|reason| TableError::Line {
@@ -172,9 +196,4 @@ fn for_each_line(
         })?;
     }
     Ok(())
-}
-
-fn agent(columns: &[&str]) -> Result<String, TableReason> {
-    Name::check(columns[1])?;
-    Ok(columns[1].to_owned())
 }

@@ -15,6 +15,16 @@ pub enum TableError {
         /// The system's reason.
         source: io::Error,
     },
+    /// The first line does not name the columns.
+    #[error("{file}, line 1: must begin with {expected}, the names of the columns, not {found:?}")]
+    Header {
+        /// The file.
+        file: String,
+        /// The names.
+        expected: &'static str,
+        /// In the line.
+        found: String,
+    },
     /// A line makes no sense.
     #[error("{file}, line {line}: {reason}")]
     Line {
@@ -87,7 +97,7 @@ pub enum TableReason {
     /// An unknown kind of sample or of sighting.
     #[error("{0:?} is not read")]
     Kind(String),
-    /// An agent's name is none.
+    /// The name of an agent or a channel is none.
     #[error(transparent)]
     Name(#[from] cogmap_proto::NameError),
     /// An agent's time runs backwards.

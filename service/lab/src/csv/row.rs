@@ -1,6 +1,6 @@
 //! One row of `samples.csv`.
 
-use cogmap_proto::Target;
+use cogmap_proto::{Name, Target};
 use nalgebra::{Isometry3, Vector3, Vector6};
 use trajectory::parse_seconds;
 
@@ -48,11 +48,11 @@ impl Row {
                 let angular = Vector3::z() * number(columns, 5)?;
                 RowBody::Velocity([linear, angular], not_negative(columns, 6)?)
             }
-            "level" => RowBody::Level(columns[3].to_owned(), number(columns, 4)?),
+            "level" => RowBody::Level(name(columns, 3)?, number(columns, 4)?),
             "descriptor" => {
                 let row = columns[4].parse();
                 let row = row.map_err(|_| TableReason::NotARow { column: 5 })?;
-                RowBody::Descriptor(columns[3].to_owned(), row)
+                RowBody::Descriptor(name(columns, 3)?, row)
             }
             "sighting" => sighting(columns)?,
             other => return Err(TableReason::Kind(other.to_owned())),
@@ -82,7 +82,7 @@ fn sighting(columns: &[&str]) -> Result<RowBody, TableReason> {
     let target = match columns[3] {
         "own_sample_at_s" => return Ok(RowBody::Revisit(parse_seconds(columns[4])?)),
         "landmark" => Target::Landmark(columns[4].to_owned()),
-        "agent" => Target::Agent(columns[4].to_owned()),
+        "agent" => Target::Agent(name(columns, 4)?),
         other => return Err(TableReason::Kind(other.to_owned())),
     };
     require(columns, 8)?;
@@ -91,6 +91,12 @@ fn sighting(columns: &[&str]) -> Result<RowBody, TableReason> {
     }
     let range_m = not_negative(columns, 6)?;
     Ok(RowBody::Range(target, range_m, not_negative(columns, 7)?))
+}
+
+/// A name, by the rule that the service has for agents and channels.
+pub(super) fn name(columns: &[&str], column: usize) -> Result<String, TableReason> {
+    Name::check(columns[column])?;
+    Ok(columns[column].to_owned())
 }
 
 pub(super) fn require(columns: &[&str], expected: usize) -> Result<(), TableReason> {

@@ -1,6 +1,6 @@
 //! Tables as the format says, and what is sent of them.
 
-use cogmap_proto::{Relation, SampleBody, Target};
+use cogmap_proto::{NameError, Relation, SampleBody, Target};
 use nalgebra::Vector3;
 
 use super::{Choice, Row, RowBody, TableError, TableReason, TableSet, Views};
@@ -103,6 +103,10 @@ fn a_bad_line_is_named() {
         ("3,b,descriptor,eye,-1", TableReason::NotARow { column: 5 }),
         ("1,b,level,light,1", TableReason::Backwards),
         (
+            "3,b,level,my light,1",
+            TableReason::Name(NameError::Character(' ')),
+        ),
+        (
             "3,b,level",
             TableReason::Columns {
                 expected: 5,
@@ -118,9 +122,24 @@ fn a_bad_line_is_named() {
         }
     }
     assert!(matches!(
-        TableSet::read("t_s\n", ""),
+        TableSet::read("t_s,agent,kind\n", ""),
         Err(TableError::Empty)
     ));
+}
+
+#[test]
+fn a_table_without_the_names_of_its_columns_is_refused() {
+    let (_, headless) = SAMPLES.split_once('\n').unwrap();
+    let refused = TableSet::read(headless, TRUTH);
+    assert!(
+        matches!(refused, Err(TableError::Header { .. })),
+        "{refused:?}"
+    );
+    let refused = TableSet::read(SAMPLES, "x,y,z\n");
+    assert!(
+        matches!(refused, Err(TableError::Header { .. })),
+        "{refused:?}"
+    );
 }
 
 #[test]
@@ -137,7 +156,9 @@ fn a_view_that_is_not_there_is_an_error() {
 #[test]
 fn a_share_of_the_distances_is_reflected() {
     let lines = (0..200).map(|k| format!("{k},a,sighting,landmark,mast,range,7.5,0.1"));
-    let text: Vec<String> = std::iter::once("t_s".to_owned()).chain(lines).collect();
+    let text: Vec<String> = std::iter::once("t_s,agent,kind".to_owned())
+        .chain(lines)
+        .collect();
     let set = TableSet::read(&text.join("\n"), "").unwrap();
     let n_reflected = |share: f64, seed: u64| {
         let mut set = set.clone();

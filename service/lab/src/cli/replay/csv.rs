@@ -65,6 +65,7 @@ struct CsvReport {
 
 pub(super) fn run(args: &CsvArgs) -> anyhow::Result<()> {
     let mut set = TableSet::load(&args.directory)?;
+    check_left_out(&set, &args.no)?;
     if let Some(share) = args.reflect {
         set.reflect(share, args.reflect_seed);
     }
@@ -85,6 +86,20 @@ pub(super) fn run(args: &CsvArgs) -> anyhow::Result<()> {
         Some(waking) => Ok(output::line(&waking.to_string())?),
         None => Ok(()),
     }
+}
+
+/// Refuses to leave out a channel that the set has not: its name is surely misspelt.
+fn check_left_out(set: &TableSet, left_out: &[String]) -> anyhow::Result<()> {
+    let channels = set.channels();
+    for name in left_out {
+        let known = channels.iter().copied().collect::<Vec<_>>().join(", ");
+        let known = if known.is_empty() { "none" } else { &known };
+        anyhow::ensure!(
+            channels.contains(name.as_str()),
+            "--no {name}: the set has no such channel; it has {known}"
+        );
+    }
+    Ok(())
 }
 
 impl CsvArgs {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::Args;
 use cogmap_lab::mrclam::{Mrclam, PlanarPose, TeamReading};
 use cogmap_proto::Sample;
@@ -32,7 +33,8 @@ pub(in crate::cli) struct MrclamArgs {
 }
 
 pub(super) fn run(args: &MrclamArgs) -> anyhow::Result<()> {
-    let set = Mrclam::load(&args.directory)?;
+    let set = Mrclam::load(&args.directory)
+        .with_context(|| format!("read {}", args.directory.display()))?;
     for robot in &args.anonymous {
         anyhow::ensure!(
             set.robots().contains_key(robot),

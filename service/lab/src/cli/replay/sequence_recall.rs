@@ -67,13 +67,23 @@ struct View {
 }
 
 impl SequenceQuestions {
-    /// Whether the set has the agent that is to be taught.
+    /// Whether the set has the agent that is to be taught, and another one that is asked for.
     ///
     /// # Errors
     /// It has not.
     pub(super) fn check(&self, set: &TableSet) -> anyhow::Result<()> {
-        let is_there = set.agents.contains_key(&self.taught);
-        anyhow::ensure!(is_there, "the set has no agent {}", self.taught);
+        let taught = &self.taught;
+        let names = set.agents.keys().map(String::as_str).collect::<Vec<_>>();
+        anyhow::ensure!(
+            set.agents.contains_key(taught),
+            "the set has no agent {taught}; it has {}",
+            names.join(", ")
+        );
+        let mut others = set.agents.iter().filter(|(name, _)| *name != taught);
+        anyhow::ensure!(
+            others.any(|(_, log)| log.truth.is_some()),
+            "nobody is left to ask for: beside {taught}, the set has no agent whose truth is known"
+        );
         Ok(())
     }
 

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::Args;
 use cogmap::cli::output;
 use cogmap_lab::csv::{Choice, TableSet};
@@ -16,9 +17,10 @@ const SPACE: &str = "sequences";
 pub(in crate::cli) struct SequencesArgs {
     /// Directory of a set with views, as `replay csv` reads it.
     directory: PathBuf,
-    /// The agent whose way is remembered; the others are asked for.
+    /// The agent whose way is remembered; the others are asked for. The first by name of those whose
+    /// truth is known when absent.
     #[arg(long, value_name = "AGENT")]
-    taught: String,
+    taught: Option<String>,
     /// Views of a question, one after the other.
     #[arg(long, default_value_t = 10, value_name = "N",
         value_parser = clap::value_parser!(u32).range(1..=64))]
@@ -41,15 +43,25 @@ fn distance_m(text: &str) -> Result<f64, String> {
     }
 }
 
+/// The first agent by name of which the truth is known.
+fn first_known(set: &TableSet) -> anyhow::Result<String> {
+    let mut known = set.agents.iter().filter(|(_, log)| log.truth.is_some());
+    let (name, _) = known.next().context("no agent of the set has a truth")?;
+    Ok(name.clone())
+}
+
 pub(super) fn run(args: &SequencesArgs) -> anyhow::Result<()> {
     let set = TableSet::load(&args.directory)?;
     let questions = SequenceQuestions {
-        taught: args.taught.clone(),
+        taught: match &args.taught {
+            Some(taught) => taught.clone(),
+            None => first_known(&set)?,
+        },
         length: args.length,
         within_m: args.within_m,
         choice: Choice::default(),
     };
-    // Without the agent no service is started.
+    // Without the agents no service is started.
     questions.check(&set)?;
     let host = Host::start()?;
     let recall = questions.ask(&host.api(), SPACE, &SpaceSettings::default(), &set)?;

@@ -73,7 +73,10 @@ mod tests {
     use std::fmt::Write as _;
 
     fn kind(agents: usize, motion: &str, without: &[&str]) -> SetKind {
-        let (mut samples, mut truth) = ("t_s,agent,kind\n".to_owned(), "t_s\n".to_owned());
+        let (mut samples, mut truth) = (
+            "t_s,agent,kind\n".to_owned(),
+            "t_s,agent,x,y,z,yaw\n".to_owned(),
+        );
         for agent in 0..agents {
             writeln!(
                 samples,
