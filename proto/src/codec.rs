@@ -13,6 +13,7 @@ use crate::error::DecodeError;
 use crate::field;
 use crate::limits::MESSAGE_BYTES_MAX;
 use crate::sample::SampleBatch;
+use crate::wording::plain;
 
 /// What all postcard encodings start with, whatever their version.
 const POSTCARD: &str = "application/vnd.cogmap.postcard";
@@ -141,5 +142,8 @@ impl Codec {
 
 /// What is wrong, at the field where it is.
 fn located(path: Option<Path>, error: &impl Display) -> String {
-    path.map_or_else(|| error.to_string(), |path| field::at_field(&path, error))
+    path.map_or_else(
+        || plain(&error.to_string()),
+        |path| field::at_field(&path, error),
+    )
 }

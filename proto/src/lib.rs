@@ -40,6 +40,7 @@ mod sample;
 mod sequence;
 mod settings;
 mod watermark;
+mod wording;
 
 pub use answer::{
     AgentAt, AgentDetail, AgentPage, AgentSummary, Evidence, GridModuleState, GridState,

@@ -42,6 +42,9 @@ pub enum InvalidQuery {
     /// The percept's channel cannot be asked for.
     #[error("percept: {0}")]
     Channel(#[from] InvalidChannel),
+    /// A channel of a list cannot be asked for.
+    #[error("channels[{0}]: {1}")]
+    ChannelOfList(usize, InvalidChannel),
     /// No channels are named, or too many.
     #[error("channels must be a list of 1 to {0} names")]
     Channels(usize),

@@ -31,8 +31,8 @@ pub fn felt(map: &CognitiveMap, query: &wire::FeltQuery) -> Result<FeltCue, Inva
         return Err(InvalidQuery::Channels(CHANNELS_MAX));
     }
     let mut channels = Vec::new();
-    for name in names.unwrap_or_default() {
-        check_channel(map, name)?;
+    for (at, name) in names.unwrap_or_default().iter().enumerate() {
+        check_channel(map, name).map_err(|error| InvalidQuery::ChannelOfList(at, error))?;
         channels.extend(Label::new(name).ok());
     }
     Ok(FeltCue {

@@ -120,8 +120,8 @@ pub enum SpaceError {
     #[error(transparent)]
     InvalidSettings(#[from] InvalidSettings),
     /// It exists with other settings, and settings are fixed on creation.
-    #[error("the space exists with other settings")]
-    ExistsWithOtherSettings,
+    #[error("the space exists with other settings, which stay as they are: {0}")]
+    ExistsWithOtherSettings(String),
     /// There are as many spaces as there may be.
     #[error("there are {0} spaces already")]
     TooManySpaces(usize),
@@ -347,7 +347,8 @@ impl Engine {
             return if space.settings() == settings {
                 Ok((space, false))
             } else {
-                Err(SpaceError::ExistsWithOtherSettings)
+                let others = settings::differences(space.settings(), settings);
+                Err(SpaceError::ExistsWithOtherSettings(others))
             };
         }
         let count = self.0.spaces.load().len();

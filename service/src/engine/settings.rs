@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use cogmap_proto::SpaceSettings;
+
 /// How much the engine holds and how long it waits. None of these changes the maps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EngineSettings {
@@ -43,4 +45,18 @@ impl Default for EngineSettings {
             relaxation_threads: 2,
         }
     }
+}
+
+/// The settings of a space that are not as they are given, each with both values.
+pub(crate) fn differences(there: &SpaceSettings, given: &SpaceSettings) -> String {
+    let fields = |settings| match serde_json::to_value(settings) {
+        Ok(serde_json::Value::Object(fields)) => fields,
+        _ => unreachable!("settings are an object"),
+    };
+    let (there, given) = (fields(there), fields(given));
+    let other = there.iter().filter_map(|(name, value)| {
+        let wanted = given.get(name).unwrap_or(&serde_json::Value::Null);
+        (wanted != value).then(|| format!("{name} is {value}, not {wanted}"))
+    });
+    other.collect::<Vec<_>>().join("; ")
 }

@@ -145,7 +145,24 @@ where
 {
     let path = Path::<T>::from_request_parts(parts, service).await;
     path.map(|Path(params)| params)
-        .map_err(|rejection| Problem::new(Kind::InvalidPath, rejection.body_text()))
+        .map_err(|rejection| Problem::new(Kind::InvalidPath, of_path(&rejection.body_text())))
+}
+
+/// What axum says of a path, for whoever wrote the path.
+fn of_path(text: &str) -> String {
+    let value = text.strip_prefix("Invalid URL: Cannot parse `id` with value `");
+    let value = value.and_then(|rest| rest.strip_suffix("` to a `u64`"));
+    value.map_or_else(
+        || text.to_owned(),
+        |value| format!("{value:?} is not a number, by which such a memory is called"),
+    )
+}
+
+/// What axum says of query parameters.
+fn of_query(text: &str) -> String {
+    text.trim_start_matches("Failed to deserialize query string: ")
+        .replace("invalid digit found in string", "expected a whole number")
+        .replace("invalid float literal", "expected a number")
 }
 
 impl FromRequestParts<Service> for SpaceOfPath {
@@ -194,7 +211,9 @@ impl<T: DeserializeOwned> FromRequestParts<Service> for Query<T> {
     async fn from_request_parts(parts: &mut Parts, _: &Service) -> Result<Self, Problem> {
         axum::extract::Query::try_from_uri(&parts.uri)
             .map(|axum::extract::Query(query)| Self(query))
-            .map_err(|rejection| Problem::new(Kind::InvalidParameter, rejection.body_text()))
+            .map_err(|rejection| {
+                Problem::new(Kind::InvalidParameter, of_query(&rejection.body_text()))
+            })
     }
 }
 

@@ -9,6 +9,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use super::problem::{Kind, Problem};
+use super::refusal;
 
 /// Largest number up to which every integer has a float of its own.
 const FLOAT_INTEGER_MAX: f64 = 9_007_199_254_740_992.0;
@@ -16,11 +17,10 @@ const FLOAT_INTEGER_MAX: f64 = 9_007_199_254_740_992.0;
 /// A JSON text as a message. What cannot be read is refused by the name of its field.
 pub(crate) fn message<T: DeserializeOwned + Serialize>(bytes: &[u8]) -> Result<T, Problem> {
     let malformed = |detail: String| Problem::new(Kind::MalformedBody, detail);
-    let mut given: Value =
-        serde_json::from_slice(bytes).map_err(|error| malformed(error.to_string()))?;
+    let mut given = value(bytes).map_err(malformed)?;
     make_whole_numbers_integers(&mut given);
     let message: T = serde_path_to_error::deserialize(&given)
-        .map_err(|error| malformed(cogmap_proto::at_field(error.path(), error.inner())))?;
+        .map_err(|error| malformed(refusal::of::<T>(&given, &error)))?;
     let written = serde_json::to_value(&message).map_err(|error| malformed(error.to_string()))?;
     if let Some(mut path) = array_for_object(&given, &written) {
         path.reverse();
@@ -34,6 +34,14 @@ pub(crate) fn message<T: DeserializeOwned + Serialize>(bytes: &[u8]) -> Result<T
         )));
     }
     Ok(message)
+}
+
+/// A text as JSON.
+fn value(bytes: &[u8]) -> Result<Value, String> {
+    if bytes.trim_ascii().is_empty() {
+        return Err("the body is empty".to_owned());
+    }
+    serde_json::from_slice(bytes).map_err(|error| format!("the body is no JSON: {error}"))
 }
 
 /// Where an array stands in `given` for an object, innermost part first: serde takes one for the
@@ -58,25 +66,26 @@ fn array_for_object(given: &Value, written: &Value) -> Option<Vec<String>> {
 
 /// A batch of samples. What serde can read directly takes no detour.
 pub(crate) fn batch(bytes: &[u8]) -> Result<SampleBatch, DecodeError> {
+    let malformed = |detail: String| DecodeError::Malformed {
+        codec: Codec::Json.name(),
+        detail,
+    };
     let array = bytes.trim_ascii_start().first() == Some(&b'[');
     if array {
-        let detail = "a batch is an object, not an array".to_owned();
-        return Err(DecodeError::Malformed {
-            codec: Codec::Json.name(),
-            detail,
-        });
+        return Err(malformed("a batch is an object, not an array".to_owned()));
     }
     let direct = Codec::Json.decode_batch(bytes);
     if !matches!(direct, Err(DecodeError::Malformed { .. })) {
         return direct;
     }
-    let Ok(mut value) = serde_json::from_slice::<Value>(bytes) else {
-        return direct;
-    };
+    let mut value = value(bytes).map_err(malformed)?;
     make_whole_numbers_integers(&mut value);
-    Codec::Json
-        .decode_batch(value.to_string().as_bytes())
-        .or(direct)
+    let error = match serde_path_to_error::deserialize::<_, SampleBatch>(&value) {
+        // Whatever bound it breaks is told as of any other batch.
+        Ok(_) => return Codec::Json.decode_batch(value.to_string().as_bytes()),
+        Err(error) => error,
+    };
+    Err(malformed(refusal::of::<SampleBatch>(&value, &error)))
 }
 
 fn make_whole_numbers_integers(value: &mut Value) {

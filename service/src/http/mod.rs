@@ -42,6 +42,7 @@ mod places;
 mod predict;
 mod problem;
 mod recall;
+mod refusal;
 mod reply;
 mod route;
 mod samples;

@@ -3,7 +3,7 @@
 
 mod kind;
 
-use cogmap_proto::DecodeError;
+use cogmap_proto::{Codec, DecodeError};
 pub use kind::Kind;
 
 use crate::decode::{
@@ -42,7 +42,8 @@ impl Problem {
 
     /// There is no such space.
     pub fn unknown_space(name: &str) -> Self {
-        Self::new(Kind::UnknownSpace, format!("there is no space {name:?}"))
+        let detail = format!("there is no space {name:?}; PUT /v1/spaces/{name} creates it");
+        Self::new(Kind::UnknownSpace, detail)
     }
 
     /// Nobody in reach owns the space now.
@@ -124,7 +125,12 @@ impl From<DecodeError> for Problem {
             | DecodeError::SequenceOverflow
             | DecodeError::LastSession => Kind::InvalidQuery,
         };
-        Self::new(kind, error.to_string())
+        let detail = match error {
+            // It names the field; the codec is the one of whoever asks by hand.
+            DecodeError::Malformed { codec, detail } if codec == Codec::Json.name() => detail,
+            error => error.to_string(),
+        };
+        Self::new(kind, detail)
     }
 }
 
@@ -132,7 +138,10 @@ impl From<InvalidQuery> for Problem {
     fn from(error: InvalidQuery) -> Self {
         let kind = match &error {
             InvalidQuery::UnknownAgent(name) => return Self::unknown_agent(name),
-            InvalidQuery::Channel(InvalidChannel::Unknown { .. }) => Kind::UnknownChannel,
+            InvalidQuery::Channel(InvalidChannel::Unknown { .. })
+            | InvalidQuery::ChannelOfList(_, InvalidChannel::Unknown { .. }) => {
+                Kind::UnknownChannel
+            }
             _ => Kind::InvalidQuery,
         };
         Self::new(kind, error.to_string())
@@ -241,7 +250,7 @@ impl From<SpaceError> for Problem {
     fn from(error: SpaceError) -> Self {
         let kind = match error {
             SpaceError::InvalidSettings(_) => Kind::InvalidSettings,
-            SpaceError::ExistsWithOtherSettings => Kind::OtherSettings,
+            SpaceError::ExistsWithOtherSettings(_) => Kind::OtherSettings,
             SpaceError::TooManySpaces(_) => Kind::TooManySpaces,
             SpaceError::Unknown => Kind::UnknownSpace,
             SpaceError::Closed => Kind::Closing,

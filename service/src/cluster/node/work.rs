@@ -209,8 +209,10 @@ fn create_spaces(engine: &Engine, shard: ShardNumber, spaces: &BTreeMap<Name, Sp
     for (name, settings) in of_shard {
         match engine.create_space(name, settings) {
             Ok(_) => {}
-            Err(SpaceError::ExistsWithOtherSettings) => tracing::warn!(space = %name,
-                "the settings given for the space are without effect: they were fixed when it was created"),
+            Err(SpaceError::ExistsWithOtherSettings(others)) => {
+                tracing::warn!(space = %name, others,
+                "the settings given for the space are without effect: they were fixed when it was created")
+            }
             Err(error) => tracing::error!(space = %name, %error, "create a space"),
         }
     }
