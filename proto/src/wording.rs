@@ -60,15 +60,15 @@ fn without_position(text: &str) -> &str {
 fn kind(expected: &str) -> String {
     let whole = |most: u64| format!("a whole number from 0 to {most}");
     let plain = match expected {
-        "f64" | "f32" => "a number",
+        "f64" | "f32" | "float" => "a number",
         "u64" | "usize" => "a whole number from 0 on",
-        "i64" => "a whole number",
+        "i64" | "integer" => "a whole number",
         "u32" => return whole(u32::MAX.into()),
         "u16" => return whole(u16::MAX.into()),
         "u8" => return whole(u8::MAX.into()),
-        "a string" | "string" => "a text",
-        "a boolean" => "true or false",
-        "a sequence" => "a list",
+        "a string" | "string" | "str" => "a text",
+        "a boolean" | "bool" => "true or false",
+        "a sequence" | "array" => "a list",
         "string or map" => "an object with one entry",
         _ => "",
     };
@@ -88,7 +88,11 @@ fn kind(expected: &str) -> String {
 /// What was found.
 fn value(found: &str) -> String {
     match found {
-        "sequence" => return "a list".to_owned(),
+        "sequence" | "array" => return "a list".to_owned(),
+        // CBOR tells the type alone.
+        "string" => return "a text".to_owned(),
+        "integer" => return "a whole number".to_owned(),
+        "float" => return "a number".to_owned(),
         "map" => return "an object".to_owned(),
         "unit value" => return "null".to_owned(),
         _ => {}

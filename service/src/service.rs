@@ -143,7 +143,7 @@ impl Service {
         };
         let listener = listen(address).map_err(of_http)?;
         if config.http.is_open() {
-            tracing::warn!(%address, "anyone who reaches this address can read and write: set http.token");
+            tracing::warn!(%address, "anyone who reaches this address can read and write: set http.token_file");
         }
         let address = listener.local_addr().map_err(of_http)?;
         let (session, publisher) = open_zenoh(config, shares).await?;
@@ -260,6 +260,13 @@ async fn open_zenoh(
     }
     if config.cluster.enabled && config.zenoh.mode == ZenohMode::Router {
         tokio::time::sleep(ROUTER_PAUSE).await;
+    }
+    for endpoint in transport::open_endpoints(&settings)? {
+        tracing::warn!(
+            endpoint,
+            "anyone who reaches this endpoint can publish as any robot: set zenoh.config_file with \
+             users and rules, as docs/security.md says"
+        );
     }
     // Somebody may have come first since.
     let session = transport::open(&settings).await;

@@ -94,7 +94,8 @@ def test_samples_that_make_no_sense_are_refused_one_by_one(service: Server) -> N
 
 def test_a_robot_of_a_space_that_is_not_there_is_told_at_once(service: Server) -> None:
     where = f"cogmap/defualt/query/watermark at {service.endpoint}"
-    with pytest.raises(cogmap.ApiError, match=f'"defualt" .{where}.$') as refused:
+    said = f'"defualt"; PUT /v1/spaces/defualt creates it .{where}.$'
+    with pytest.raises(cogmap.ApiError, match=said) as refused:
         cogmap.Robot("defualt", "ada", connect=service.endpoint)
     assert refused.value.status == 404
     with service.robot("ada") as robot:

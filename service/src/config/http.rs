@@ -4,6 +4,8 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::time::Duration;
 
+use serde::de::{Deserialize, Deserializer, Error};
+
 use super::ConfigError;
 use super::setting::{COUNT, INTERVAL_S, Rule, any, section};
 use crate::http::{HostRule, HttpSettings, Token};
@@ -43,6 +45,7 @@ section! {
     /// Settings of the HTTP interface.
     pub struct HttpConfig of "http" {
         /// Address and port; port 0 takes a free one.
+        #[serde(deserialize_with = "address")]
         listen: SocketAddr = SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)), any("an address and a port");
         /// Bearer token that every request but those for health and the pages must carry; absent,
         /// none is asked for.
@@ -76,6 +79,25 @@ section! {
         /// Longest wait for open requests when the service stops \[s\].
         shutdown_timeout_s: f64 = 5.0, INTERVAL_S;
     }
+}
+
+/// An address with its port, given as a text.
+fn address<'de, D: Deserializer<'de>>(deserializer: D) -> Result<SocketAddr, D::Error> {
+    const EXPECTED: &str = "expected an IP address and a port, like 127.0.0.1:8080 or [::1]:8080";
+    let given = toml::Value::deserialize(deserializer)?;
+    let text = given
+        .as_str()
+        .map_or_else(|| given.to_string(), str::to_owned);
+    text.parse().map_err(|_| {
+        let port = text.parse::<u16>();
+        let also = port.map_or_else(
+            |_| String::new(),
+            |port| {
+                format!(", a port alone: 127.0.0.1:{port} serves this machine, 0.0.0.0:{port} all")
+            },
+        );
+        D::Error::custom(format!("{EXPECTED}, not {text}{also}"))
+    })
 }
 
 fn is_host(name: &str) -> bool {
@@ -131,7 +153,15 @@ impl HttpConfig {
         let source = format!("http.token_file {shown}");
         let text =
             std::fs::read_to_string(path).map_err(|error| ConfigError::source(&source, &error))?;
-        self.token = Some(Token::new(text.lines().next().unwrap_or_default().trim()));
+        let token = Token::new(text.lines().next().unwrap_or_default().trim());
+        if !token.is_presentable() {
+            let detail = format!(
+                "its first line, which is the token, must be {}",
+                TOKEN.words
+            );
+            return Err(ConfigError::source(&source, &detail));
+        }
+        self.token = Some(token);
         Ok(())
     }
 

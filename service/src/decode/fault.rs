@@ -4,7 +4,13 @@
 use std::fmt::Debug;
 
 use cogmap_proto as wire;
-use cognitive_map::{Descriptor, Label, Level, Motion, PoseNoise, StartPose, Touch, TouchNoise};
+use cogmap_proto::limits::{
+    DESCRIPTOR_LEN_MAX, DESCRIPTOR_LEN_MIN, DURATION_S_MAX, LABEL_BYTES_MAX, METRES_MAX,
+    NAME_BYTES_MAX, RADIANS_PER_SECOND_MAX,
+};
+use cognitive_map::{
+    Descriptor, InvalidSample, Label, Level, Motion, PoseNoise, StartPose, Touch, TouchNoise,
+};
 
 use super::contact::{check_channels, touch, touch_noise};
 use super::motion::noise;
@@ -64,6 +70,45 @@ pub(super) fn in_sample(sample: &wire::Sample) -> String {
             .within("body.marker"),
         wire::SampleBody::Object(_) => "body.object".to_owned(),
         wire::SampleBody::SessionEnd {} => "body.session_end".to_owned(),
+    }
+}
+
+/// Why a sample that has just come is refused: its field, the value and the rule. Nothing of one
+/// that makes sense.
+pub fn refusal(sample: &wire::Sample) -> Option<String> {
+    let error = super::sample::sample(sample).err()?;
+    let field = in_sample(sample);
+    let rule = rule(&field, error);
+    Some(format!("{field}: {rule}"))
+}
+
+/// What a field must be, where the core's word for it has no limits.
+fn rule(field: &str, error: InvalidSample) -> String {
+    let path = field.split(' ').next().unwrap_or_default();
+    let name = path.rsplit('.').next().unwrap_or_default();
+    match (error, name) {
+        (InvalidSample::NumberOutOfRange, "duration_s") => {
+            format!("must be 0 to {DURATION_S_MAX} s")
+        }
+        (InvalidSample::NumberOutOfRange, "angular_rad_s") => {
+            format!("must be finite, and at most {RADIANS_PER_SECOND_MAX} rad/s")
+        }
+        (InvalidSample::NumberOutOfRange, "translation_m" | "linear_m_s" | "offset_m") => {
+            format!("must be finite, and at most {METRES_MAX:e}")
+        }
+        (InvalidSample::NonUnitQuaternion, _) => {
+            "must be a unit quaternion [x, y, z, w]".to_owned()
+        }
+        (InvalidSample::InvalidDescriptor, _) => format!(
+            "must be {DESCRIPTOR_LEN_MIN} to {DESCRIPTOR_LEN_MAX} numbers that are not all zero"
+        ),
+        (InvalidSample::InvalidLabel, "channel") => format!(
+            "must be a name: 1 to {NAME_BYTES_MAX} of A-Z a-z 0-9 _ . -, the first a letter or digit"
+        ),
+        (InvalidSample::InvalidLabel, "label") => {
+            format!("must be 1 to {LABEL_BYTES_MAX} bytes without control characters")
+        }
+        _ => error.to_string(),
     }
 }
 
@@ -197,9 +242,6 @@ fn in_descriptor(body: &wire::Descriptor) -> Fault {
         .or("vector", &format_args!("{length}"), alone)
 }
 
-fn pose(
-    translation_m: [f64; 3],
-    rotation_xyzw: [f64; 4],
-) -> Result<StartPose, cognitive_map::InvalidSample> {
+fn pose(translation_m: [f64; 3], rotation_xyzw: [f64; 4]) -> Result<StartPose, InvalidSample> {
     StartPose::new(translation_m, rotation_xyzw, PoseNoise::none())
 }

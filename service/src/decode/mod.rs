@@ -29,6 +29,7 @@ mod trajectory;
 pub use bounds::{Bound, setting_bounds};
 pub use channel::InvalidChannel;
 pub use cue::{InvalidQuery, cue, unknown_agent};
+pub use fault::refusal;
 pub use felt::felt;
 pub use instruction::{blockage, errand};
 pub use journal::records_of;

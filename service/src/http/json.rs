@@ -80,10 +80,9 @@ pub(crate) fn batch(bytes: &[u8]) -> Result<SampleBatch, DecodeError> {
     }
     let mut value = value(bytes).map_err(malformed)?;
     make_whole_numbers_integers(&mut value);
-    let error = match serde_path_to_error::deserialize::<_, SampleBatch>(&value) {
-        // Whatever bound it breaks is told as of any other batch.
-        Ok(_) => return Codec::Json.decode_batch(value.to_string().as_bytes()),
-        Err(error) => error,
+    let Err(error) = serde_path_to_error::deserialize::<_, SampleBatch>(&value) else {
+        // A bound that it breaks is told as of any other batch.
+        return Codec::Json.decode_batch(value.to_string().as_bytes());
     };
     Err(malformed(refusal::of::<SampleBatch>(&value, &error)))
 }

@@ -121,14 +121,14 @@ mod tests {
 
     use super::*;
 
-    fn refused<T: DeserializeOwned>(given: Value) -> String {
-        let error = serde_path_to_error::deserialize::<_, T>(&given).map(drop);
-        of::<T>(&given, &error.expect_err("no such message"))
+    fn refused<T: DeserializeOwned>(given: &Value) -> String {
+        let error = serde_path_to_error::deserialize::<_, T>(given).map(drop);
+        of::<T>(given, &error.expect_err("no such message"))
     }
 
     #[test]
     fn what_belongs_in_place_of_another_value_is_told() {
-        let route = |to| refused::<RouteQuery>(json!({"from": {"place": 1}, "to": to}));
+        let route = |to| refused::<RouteQuery>(&json!({"from": {"place": 1}, "to": to}));
         assert_eq!(
             route(json!("home")),
             "to: expected {\"home\": …}, not \"home\" alone"
@@ -141,17 +141,17 @@ mod tests {
         assert!(told.ends_with("such as {\"place\": …}"), "{told}");
         let cost = json!({"from": {"place": 1}, "to": {"place": 2}, "cost": 5});
         assert_eq!(
-            refused::<RouteQuery>(cost),
+            refused::<RouteQuery>(&cost),
             "cost: expected one of `length`, `time`, `uncertainty`, `recency`"
         );
         assert_eq!(
-            refused::<PredictQuery>(json!({"motion": {"increment": [1, 0, 0]}})),
+            refused::<PredictQuery>(&json!({"motion": {"increment": [1, 0, 0]}})),
             "motion.increment: expected an object with `translation_m`, not a list"
         );
         let body = json!({"increment": {"translation_m": [1, 0], "rotation_xyzw": [0, 0, 0, 1]}});
         let sample = json!({"stamp_ns": 0, "body": body});
         assert_eq!(
-            refused::<SampleBatch>(json!({"session": 1, "first_seq": 0, "samples": [sample]})),
+            refused::<SampleBatch>(&json!({"session": 1, "first_seq": 0, "samples": [sample]})),
             "samples[0].body.increment.translation_m: expected a list of 3 numbers, \
             not 2 of them"
         );

@@ -2,18 +2,34 @@
 
 use axum::body::Body;
 use axum::http::Response;
-use cogmap_proto::{Codec, IngestAnswer, SampleBatch};
+use cogmap_proto::{Codec, DecodeError, IngestAnswer, SampleBatch};
+use serde::Serialize;
 
 use super::extract::{AgentName, AgentParams, Encoded, NoQuery};
 use super::json;
 use super::problem::{Problem, SequenceProblem};
 use super::reply;
+use crate::decode;
+
+/// Most refused samples of a request that are explained.
+const EXPLAINED_MAX: usize = 16;
+
+/// Answer to samples: they are on disk, but for those that are refused.
+#[derive(Debug, Serialize, utoipa::ToSchema)]
+pub(crate) struct SamplesAnswer {
+    #[serde(flatten)]
+    answer: IngestAnswer,
+    /// Why samples of the request are refused, the first 16 of them: field, value and rule, as in
+    /// `samples[3].body.level.channel "my light": …`. Absent where none is.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    refused: Vec<String>,
+}
 
 /// Send samples.
 ///
 /// Answers when they are on disk. Samples that had been there before are counted and otherwise
 /// ignored, so a request may be sent again after a broken connection. Samples that make no sense
-/// are refused one by one and listed in the watermark.
+/// are refused one by one, listed in the watermark, and explained in `refused`.
 #[utoipa::path(post, path = "/v1/spaces/{space}/agents/{agent}/samples", tag = "agents",
     operation_id = "send_samples", params(AgentParams),
     request_body(content(
@@ -22,7 +38,7 @@ use super::reply;
         (Vec<u8> = "application/vnd.cogmap.postcard;v1")),
         description = "Consecutive samples of the agent"),
     responses(
-        (status = 200, description = "The samples are on disk", body = IngestAnswer),
+        (status = 200, description = "The samples are on disk", body = SamplesAnswer),
         (status = 404, description = "There is no such space"),
         (status = 409, description = "Earlier samples are missing, a newer session has taken the \
             agent over, or the space has its full number of agents",
@@ -35,10 +51,36 @@ pub(crate) async fn post(
     _: NoQuery,
     body: Encoded,
 ) -> Result<Response<Body>, Problem> {
-    let batch = match body.codec {
+    let batch = read(&body)?;
+    let (session, first_seq) = (batch.session, batch.first_seq);
+    let answer: IngestAnswer = space.ingest(&agent, batch).await?;
+    let end_seq = answer
+        .watermark
+        .rejected
+        .last()
+        .map_or(0, |last| last.range.to);
+    let refused = if answer.watermark.session == session && end_seq > first_seq {
+        explained(&body)
+    } else {
+        Vec::new()
+    };
+    Ok(reply::json(&SamplesAnswer { answer, refused }))
+}
+
+fn read(body: &Encoded) -> Result<SampleBatch, DecodeError> {
+    match body.codec {
         Codec::Json => json::batch(&body.bytes),
         Codec::Cbor | Codec::Postcard => body.codec.decode_batch(&body.bytes),
-    };
-    let answer: IngestAnswer = space.ingest(&agent, batch?).await?;
-    Ok(reply::json(&answer))
+    }
+}
+
+/// Why samples of a body are refused. It is read a second time, so that one of which none is
+/// refused pays nothing.
+fn explained(body: &Encoded) -> Vec<String> {
+    let samples = read(body).map(|batch| batch.samples).unwrap_or_default();
+    let refused = samples.iter().enumerate().filter_map(|(at, sample)| {
+        let why = decode::refusal(sample)?;
+        Some(format!("samples[{at}].{why}"))
+    });
+    refused.take(EXPLAINED_MAX).collect()
 }

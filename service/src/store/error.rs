@@ -10,7 +10,9 @@ use super::log::{Damage, Extent, Flaw, Survey};
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// Another process holds the directory.
-    #[error("{0} is in use by another process")]
+    #[error(
+        "{0} is in use by another process: stop that service first, or choose another directory with --data-dir"
+    )]
     Locked(String),
     /// The directory was written by a newer version.
     #[error("the store has format {found}, this build reads up to {supported}: update cogmap")]

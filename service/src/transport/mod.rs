@@ -17,4 +17,5 @@ pub use linger::forbid as forbid_lingering;
 #[cfg(feature = "object-storage")]
 pub use presence::ZenohPresence;
 pub use publisher::ZenohPublisher;
+pub(crate) use session::open_endpoints;
 pub use session::{TransportError, TransportSettings, open};

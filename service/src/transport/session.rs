@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use zenoh::{Config, Session};
 
+use crate::ports::is_reachable;
+
 /// How the service takes part in a Zenoh network.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TransportSettings {
@@ -24,6 +26,19 @@ pub struct TransportSettings {
     pub handshakes_max: usize,
 }
 
+/// Key of the file with users and their passwords.
+const PASSWORDS: &str = "transport/auth/usrpwd/dictionary_file";
+/// Key that says whether whoever connects over TLS shows a certificate.
+const MTLS: &str = "transport/link/tls/enable_mtls";
+/// Keys of the service's own certificate and key, each as a file or as it is.
+const CERTIFICATE: [&str; 2] = [
+    "transport/link/tls/listen_certificate",
+    "transport/link/tls/listen_certificate_base64",
+];
+const PRIVATE_KEY: [&str; 2] = [
+    "transport/link/tls/listen_private_key",
+    "transport/link/tls/listen_private_key_base64",
+];
 /// Key of Zenoh's bound on sessions.
 const SESSIONS: &str = "transport/unicast/max_sessions";
 /// Key of Zenoh's bound on connections that are not yet a session.
@@ -71,8 +86,36 @@ pub struct TransportError(String);
 
 impl From<zenoh::Error> for TransportError {
     fn from(error: zenoh::Error) -> Self {
-        Self(error.to_string())
+        Self(without_sources(&error.to_string()))
     }
+}
+
+/// What Zenoh says, without the lines of its source (` at /…/utils.rs:532.`).
+fn without_sources(text: &str) -> String {
+    let is_source = |part: &str| {
+        let (file, line) = part.trim_end_matches('.').rsplit_once(".rs:")?;
+        let is_line = line.bytes().all(|byte| byte.is_ascii_digit());
+        (is_line && !file.contains(' ')).then_some(())
+    };
+    let parts = text.split(" at ");
+    let kept: Vec<_> = parts.filter(|part| is_source(part).is_none()).collect();
+    kept.join(" at ")
+}
+
+/// Endpoints that others than this machine reach, where nobody has to say who it is: neither by a
+/// password nor by a certificate.
+///
+/// # Errors
+/// The configuration file cannot be read.
+pub(crate) fn open_endpoints(settings: &TransportSettings) -> Result<Vec<&str>, TransportError> {
+    let config = config(settings)?;
+    let is_set = |key| config.get_json(key).is_ok_and(|value| value != "null");
+    let asks_certificates = config.get_json(MTLS).is_ok_and(|value| value == "true");
+    if is_set(PASSWORDS) || asks_certificates {
+        return Ok(Vec::new());
+    }
+    let listen = settings.listen.iter().map(String::as_str);
+    Ok(listen.filter(|endpoint| is_reachable(endpoint)).collect())
 }
 
 /// Opens the session. Scouting by multicast is off: who talks to whom is written down.
@@ -89,6 +132,7 @@ fn config(settings: &TransportSettings) -> Result<Config, TransportError> {
         Some(file) => read(file)?,
         None => Config::default(),
     };
+    check_certificate(settings, &config)?;
     let quoted = |value: &[String]| serde_json::json!(value).to_string();
     config.insert_json5("mode", &serde_json::json!(settings.mode).to_string())?;
     config.insert_json5("listen/endpoints", &quoted(&settings.listen))?;
@@ -107,6 +151,24 @@ fn config(settings: &TransportSettings) -> Result<Config, TransportError> {
         config.insert_json5(HANDSHAKES, &most.to_string())?;
     }
     Ok(config)
+}
+
+/// Refuses to listen over TLS without a certificate. An endpoint may bring its own after `#`.
+fn check_certificate(settings: &TransportSettings, config: &Config) -> Result<(), TransportError> {
+    let is_set = |key: &&str| config.get_json(key).is_ok_and(|value| value != "null");
+    let has_own = |keys: [&str; 2]| keys.iter().any(is_set);
+    if has_own(CERTIFICATE) && has_own(PRIVATE_KEY) {
+        return Ok(());
+    }
+    let mut over_tls = { settings.listen.iter() }
+        .filter(|endpoint| endpoint.starts_with("tls/") && !endpoint.contains('#'));
+    over_tls.next().map_or(Ok(()), |endpoint| {
+        Err(TransportError(format!(
+            "{endpoint} needs a certificate and its key: name them in zenoh.config_file as {} and \
+             {} (docs/security.md)",
+            CERTIFICATE[0], PRIVATE_KEY[0]
+        )))
+    })
 }
 
 /// Reads a configuration file. An error names it, where Zenoh's names a line of Zenoh's source.
@@ -128,6 +190,51 @@ mod tests {
         assert_eq!(
             error,
             "zenoh: config_file /absent/zenoh.json5: No such file or directory (os error 2)"
+        );
+    }
+
+    #[test]
+    fn a_message_of_zenoh_names_no_line_of_its_source() {
+        let said = "Cannot listen on 127.0.0.1:1. No key. at /a/zenoh-1.10.2/src/utils.rs:532. \
+            at /a/unicast.rs:426.";
+        assert_eq!(
+            without_sources(said),
+            "Cannot listen on 127.0.0.1:1. No key."
+        );
+        assert_eq!(without_sources("look at this"), "look at this");
+    }
+
+    fn settings(listen: &str, config_file: Option<PathBuf>) -> TransportSettings {
+        TransportSettings {
+            mode: "peer".to_owned(),
+            listen: vec![listen.to_owned()],
+            connect: Vec::new(),
+            config_file,
+            sessions_max: 50,
+            handshakes_max: 10,
+        }
+    }
+
+    #[test]
+    fn an_endpoint_is_open_unless_whoever_comes_has_to_say_who_it_is() {
+        let file = tempfile::NamedTempFile::with_suffix(".json5").expect("a file");
+        let text = "{transport: {auth: {usrpwd: {dictionary_file: \"/users.txt\"}}}}";
+        std::fs::write(file.path(), text).expect("written");
+        let open =
+            |settings: &TransportSettings| open_endpoints(settings).expect("a configuration").len();
+        assert_eq!(open(&settings("tcp/0.0.0.0:7447", None)), 1);
+        assert_eq!(open(&settings("tcp/127.0.0.1:7447", None)), 0);
+        let own = Some(file.path().to_owned());
+        assert_eq!(open(&settings("tcp/0.0.0.0:7447", own)), 0);
+    }
+
+    #[test]
+    fn an_endpoint_over_tls_without_a_certificate_says_where_to_name_it() {
+        let error = config(&settings("tls/0.0.0.0:7447", None)).expect_err("no certificate");
+        let text = error.to_string();
+        assert!(
+            text.contains("transport/link/tls/listen_certificate"),
+            "{text}"
         );
     }
 

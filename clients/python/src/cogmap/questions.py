@@ -87,7 +87,8 @@ class Questions(HttpService):
         places by number, or what was sensed there (`Level`, `Descriptor`), oldest first;
         `error_rate` of them are wrong, and `none_prior` says how likely nobody has travelled
         such a sequence. A service that is at several of these already asks to come back (503)."""
-        query = SequenceQuery(tuple(map(element, listed("cue", cue))), error_rate, none_prior, limit)
+        elements = tuple(map(element, listed("cue", cue)))
+        query = SequenceQuery(elements, error_rate, none_prior, limit)
         path = path_of(space, "sequence")
         return self._send(SequenceAnswer, "POST", path, JSON, json_of("query", query))
 

@@ -211,7 +211,7 @@ fn create_spaces(engine: &Engine, shard: ShardNumber, spaces: &BTreeMap<Name, Sp
             Ok(_) => {}
             Err(SpaceError::ExistsWithOtherSettings(others)) => {
                 tracing::warn!(space = %name, others,
-                "the settings given for the space are without effect: they were fixed when it was created")
+                    "the settings given for the space are without effect: they were fixed when it was created");
             }
             Err(error) => tracing::error!(space = %name, %error, "create a space"),
         }

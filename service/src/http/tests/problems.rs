@@ -271,6 +271,24 @@ async fn samples_out_of_order_are_told_what_is_next() {
 }
 
 #[tokio::test]
+async fn a_refusal_says_what_is_there_and_what_is_wanted() {
+    let rig = rig();
+    let mut batch = steps(1, 0, 2);
+    if let SampleBody::Increment(increment) = &mut batch.samples[1].body {
+        increment.rotation_xyzw = [0.0; 4];
+    }
+    let answer = rig.samples("rover", &batch).await.good();
+    let refused = "samples[1].body.increment.rotation_xyzw [0.0, 0.0, 0.0, 0.0]: \
+        must be a unit quaternion [x, y, z, w]";
+    assert_eq!(answer["refused"], serde_json::json!([refused]));
+    let path = "/v1/spaces/new";
+    rig.send(Method::PUT, path, JSON, "{\"seed\": 7}").await;
+    let other = rig.send(Method::PUT, path, JSON, "{\"seed\": 8}").await;
+    let detail = other.problem(409, "other-settings")["detail"].to_string();
+    assert!(detail.contains("seed is 7, not 8"), "{detail}");
+}
+
+#[tokio::test]
 async fn bounds_of_the_engine_are_conflicts() {
     let engine = EngineSettings {
         agents_max: 1,

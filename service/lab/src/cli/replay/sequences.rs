@@ -17,8 +17,8 @@ const SPACE: &str = "sequences";
 pub(in crate::cli) struct SequencesArgs {
     /// Directory of a set with views, as `replay csv` reads it.
     directory: PathBuf,
-    /// The agent whose way is remembered; the others are asked for. The first by name of those whose
-    /// truth is known when absent.
+    /// The agent whose way is remembered; the others are asked for. When absent, the first by name
+    /// of those whose truth is known.
     #[arg(long, value_name = "AGENT")]
     taught: Option<String>,
     /// Views of a question, one after the other.
