@@ -4,8 +4,8 @@ use cogmap_proto as wire;
 use cognitive_map::{Agent, AgentId, CognitiveMap, Status};
 use geometry::upper_triangle;
 
-use super::{FRAME, OWN_FRAME};
 use super::trajectory::stamped;
+use super::{FRAME, OWN_FRAME};
 
 /// The estimate of an agent by the owner of a term; nothing before the agent's first sample.
 pub(crate) fn estimate(

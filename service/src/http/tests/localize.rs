@@ -206,6 +206,9 @@ async fn a_newcomer_is_in_a_frame_of_its_own() {
     for (agent, status, frame) in [("rover", "localized", "map"), ("newcomer", "lost", "odom")] {
         let path = format!("/v1/spaces/lab/agents/{agent}");
         let estimate = rig.get(&path).await.good()["estimate"].clone();
-        assert_eq!((&estimate["status"], &estimate["frame"]), (&status.into(), &frame.into()));
+        assert_eq!(
+            (&estimate["status"], &estimate["frame"]),
+            (&status.into(), &frame.into())
+        );
     }
 }
