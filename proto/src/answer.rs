@@ -214,7 +214,7 @@ pub struct Trajectory {
     pub map_revision: Option<u64>,
 }
 
-/// Answer to samples sent over HTTP: they are on disk.
+/// Answer to samples sent over HTTP: they are on disk, but for those that are refused.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct IngestAnswer {
@@ -222,6 +222,10 @@ pub struct IngestAnswer {
     pub watermark: Watermark,
     /// Samples of the request that had been there before.
     pub duplicates: u64,
+    /// Why samples of the request are refused by what they say, the first 16 of them: field, value
+    /// and rule, as in `samples[3].body.level.channel "my light": …`.
+    #[serde(default)]
+    pub refused: Vec<String>,
 }
 
 /// A place cell.

@@ -26,6 +26,10 @@ pub(super) fn each(visit: &mut impl Visit) {
         &IngestAnswer {
             watermark: watermark(),
             duplicates: 4,
+            refused: vec![
+                "samples[1].body.level.value NaN: a number is NaN, infinite or beyond its limit"
+                    .to_owned(),
+            ],
         },
     );
     visit.message("place_page", &places());

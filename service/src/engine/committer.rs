@@ -138,6 +138,7 @@ fn acknowledge(commit: Commit, publisher: &dyn Publisher, counters: &CommitCount
         let _ = reply.send(Ok(IngestAnswer {
             watermark: view.watermark(),
             duplicates,
+            refused: Vec::new(),
         }));
     }
     for change in commit.changes {

@@ -3,7 +3,6 @@
 use axum::body::Body;
 use axum::http::Response;
 use cogmap_proto::{Codec, DecodeError, IngestAnswer, SampleBatch};
-use serde::Serialize;
 
 use super::extract::{AgentName, AgentParams, Encoded, NoQuery};
 use super::json;
@@ -13,17 +12,6 @@ use crate::decode;
 
 /// Most refused samples of a request that are explained.
 const EXPLAINED_MAX: usize = 16;
-
-/// Answer to samples: they are on disk, but for those that are refused.
-#[derive(Debug, Serialize, utoipa::ToSchema)]
-pub(crate) struct SamplesAnswer {
-    #[serde(flatten)]
-    answer: IngestAnswer,
-    /// Why samples of the request are refused, the first 16 of them: field, value and rule, as in
-    /// `samples[3].body.level.channel "my light": …`. Absent where none is.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    refused: Vec<String>,
-}
 
 /// Send samples.
 ///
@@ -38,7 +26,7 @@ pub(crate) struct SamplesAnswer {
         (Vec<u8> = "application/vnd.cogmap.postcard;v1")),
         description = "Consecutive samples of the agent"),
     responses(
-        (status = 200, description = "The samples are on disk", body = SamplesAnswer),
+        (status = 200, description = "The samples are on disk", body = IngestAnswer),
         (status = 404, description = "There is no such space"),
         (status = 409, description = "Earlier samples are missing, a newer session has taken the \
             agent over, or the space has its full number of agents",
@@ -53,18 +41,16 @@ pub(crate) async fn post(
 ) -> Result<Response<Body>, Problem> {
     let batch = read(&body)?;
     let (session, first_seq) = (batch.session, batch.first_seq);
-    let answer: IngestAnswer = space.ingest(&agent, batch).await?;
+    let mut answer: IngestAnswer = space.ingest(&agent, batch).await?;
     let end_seq = answer
         .watermark
         .rejected
         .last()
         .map_or(0, |last| last.range.to);
-    let refused = if answer.watermark.session == session && end_seq > first_seq {
-        explained(&body)
-    } else {
-        Vec::new()
-    };
-    Ok(reply::json(&SamplesAnswer { answer, refused }))
+    if answer.watermark.session == session && end_seq > first_seq {
+        answer.refused = explained(&body);
+    }
+    Ok(reply::json(&answer))
 }
 
 fn read(body: &Encoded) -> Result<SampleBatch, DecodeError> {

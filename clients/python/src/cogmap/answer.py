@@ -166,11 +166,14 @@ class Watermark:
 
 @dataclass(frozen=True)
 class IngestAnswer:
-    """Answer to samples sent over HTTP: they are on disk."""
+    """Answer to samples sent over HTTP: they are on disk, but for those that are refused."""
 
     watermark: Watermark
     #: Samples of the request that had been there before.
     duplicates: int
+    #: Why samples of the request are refused by what they say, the first 16 of them: field, value
+    #: and rule.
+    refused: Tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
