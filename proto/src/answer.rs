@@ -222,8 +222,9 @@ pub struct IngestAnswer {
     pub watermark: Watermark,
     /// Samples of the request that had been there before.
     pub duplicates: u64,
-    /// Why samples of the request are refused by what they say, the first 16 of them: field, value
-    /// and rule, as in `samples[3].body.level.channel "my light": …`.
+    /// Why samples of the request make no sense by themselves, the first 16 of them: field, value
+    /// and rule, as in `samples[3].body.level.channel "my light": …`. Stamps that run backwards
+    /// are in the watermark alone.
     #[serde(default)]
     pub refused: Vec<String>,
 }

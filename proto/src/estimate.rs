@@ -33,8 +33,8 @@ pub struct Estimate {
     pub seq: u64,
     /// Stamp of that sample \[ns\].
     pub stamp_ns: i64,
-    /// Frame of the pose: `map`; or `odom` while the agent is lost and nothing ties it to the map,
-    /// a frame of its own that begins where it began to be lost.
+    /// Frame of the pose: `map`; or `unplaced` while the agent is lost and nothing ties it to the
+    /// map, another frame, which agents that have found one another share.
     pub frame: String,
     /// Number of records that the map includes.
     pub map_revision: u64,

@@ -43,14 +43,13 @@ pub struct LiveAgent {
     pub stamp_ns: i64,
     /// How it is localised.
     pub status: Status,
-    /// Position in `map` \[m\].
+    /// Position in the frame of its estimate \[m\]: `map` unless it is lost.
     pub translation_m: [f64; 3],
-    /// Orientation in `map`, unit quaternion `[x, y, z, w]`.
+    /// Orientation in that frame, unit quaternion `[x, y, z, w]`.
     pub rotation_xyzw: [f64; 4],
-    /// Upper triangle, row by row, of the covariance of the position along the axes of `map`
-    /// \[m²\].
+    /// Upper triangle, row by row, of the covariance of the position along its axes \[m²\].
     pub position_covariance_m2: [f64; 6],
-    /// Standard deviation of the orientation about the axes of `map` \[rad\].
+    /// Standard deviation of the orientation about them \[rad\].
     pub rotation_sd_rad: [f64; 3],
     /// The place cell that answers strongest, if any does.
     pub place: Option<u64>,

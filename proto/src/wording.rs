@@ -26,7 +26,11 @@ pub(crate) fn plain(text: &str) -> String {
         return "expected an object with exactly one entry".to_owned();
     }
     if let Some(length) = found.strip_prefix("invalid length ") {
-        return format!("expected {}, not {length} of them", kind(expected));
+        return match kind(expected).as_str() {
+            "an object" => format!("expected an object, not a list of {length}"),
+            "fewer elements in array" => format!("expected a shorter list, not one of {length}"),
+            kind => format!("expected {kind}, not {length} of them"),
+        };
     }
     let found = found
         .strip_prefix("invalid type: ")
@@ -70,6 +74,7 @@ fn kind(expected: &str) -> String {
         "a boolean" | "bool" => "true or false",
         "a sequence" | "array" => "a list",
         "string or map" => "an object with one entry",
+        "unit" => "the name alone",
         _ => "",
     };
     if !plain.is_empty() {
@@ -125,6 +130,14 @@ mod tests {
             (
                 "invalid length 2, expected an array of length 3",
                 "expected a list of 3 numbers, not 2 of them",
+            ),
+            (
+                "invalid length 0, expected struct RouteQuery with 4 elements",
+                "expected an object, not a list of 0",
+            ),
+            (
+                "invalid length 4, expected fewer elements in array",
+                "expected a shorter list, not one of 4",
             ),
             (
                 "unknown variant `hme`, expected `home` or `place`",

@@ -93,7 +93,7 @@ fn address<'de, D: Deserializer<'de>>(deserializer: D) -> Result<SocketAddr, D::
         let also = port.map_or_else(
             |_| String::new(),
             |port| {
-                format!(", a port alone: 127.0.0.1:{port} serves this machine, 0.0.0.0:{port} all")
+                format!(", a port alone; 127.0.0.1:{port} serves this machine, 0.0.0.0:{port} all")
             },
         );
         D::Error::custom(format!("{EXPECTED}, not {text}{also}"))

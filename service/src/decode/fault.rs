@@ -1,8 +1,6 @@
 //! Which field breaks a rule, for whoever asked. Each field is tried by itself by the rules that
 //! refused the whole; so nothing is decided here, and what makes sense pays nothing for it.
 
-use std::fmt::Debug;
-
 use cogmap_proto as wire;
 use cogmap_proto::limits::{
     DESCRIPTOR_LEN_MAX, DESCRIPTOR_LEN_MIN, DURATION_S_MAX, LABEL_BYTES_MAX, METRES_MAX,
@@ -11,11 +9,15 @@ use cogmap_proto::limits::{
 use cognitive_map::{
     Descriptor, InvalidSample, Label, Level, Motion, PoseNoise, StartPose, Touch, TouchNoise,
 };
+use serde::Serialize;
 
 use super::contact::{check_channels, touch, touch_noise};
 use super::motion::noise;
 use super::name::check_name;
-use super::sighting::{relation, target};
+use super::sighting::relation;
+
+/// Most characters of a value that are shown.
+const SHOWN_MAX: usize = 80;
 
 /// A rotation by nothing.
 const IDENTITY_XYZW: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
@@ -25,9 +27,14 @@ struct Fault(Option<String>);
 
 impl Fault {
     /// Goes on to the next field: its name and value, and what the rules say of it alone.
-    fn or<T, E>(self, name: &str, value: &dyn Debug, alone: Result<T, E>) -> Self {
+    fn or<T, E>(self, name: &str, value: &impl Serialize, alone: Result<T, E>) -> Self {
+        self.or_said(name, || shown(value), alone)
+    }
+
+    /// The same with what is said of the value.
+    fn or_said<T, E>(self, name: &str, said: impl FnOnce() -> String, alone: Result<T, E>) -> Self {
         match (self.0, alone) {
-            (None, Err(_)) => Self(Some(format!("{name} {value:?}"))),
+            (None, Err(_)) => Self(Some(format!("{name} {}", said()))),
             (found, _) => Self(found),
         }
     }
@@ -41,6 +48,16 @@ impl Fault {
     }
 }
 
+/// A value as JSON, as far as a line shows it.
+fn shown(value: &impl Serialize) -> String {
+    let whole = serde_json::to_string(value).unwrap_or_default();
+    let mut text: String = whole.chars().take(SHOWN_MAX).collect();
+    if text.len() < whole.len() {
+        text.push('…');
+    }
+    text
+}
+
 /// The field of a sample.
 pub(super) fn in_sample(sample: &wire::Sample) -> String {
     match &sample.body {
@@ -49,7 +66,7 @@ pub(super) fn in_sample(sample: &wire::Sample) -> String {
         wire::SampleBody::Level(level) => in_level(level).within("body.level"),
         wire::SampleBody::Descriptor(body) => in_descriptor(body).within("body.descriptor"),
         wire::SampleBody::Sighting(body) => Fault(None)
-            .or("target", &body.target, target(&body.target))
+            .or("target", &body.target, name_of(&body.target))
             .or("relation", &body.relation, relation(&body.relation))
             .within("body.sighting"),
         wire::SampleBody::StartPose(body) => Fault(None)
@@ -82,6 +99,15 @@ pub fn refusal(sample: &wire::Sample) -> Option<String> {
     Some(format!("{field}: {rule}"))
 }
 
+/// Whether what was seen can be called so, as of a sample that has just come.
+fn name_of(target: &wire::Target) -> Result<(), InvalidSample> {
+    match target {
+        wire::Target::Agent(name) => check_name(name),
+        wire::Target::Landmark(label) => Label::new(label).map(drop),
+        wire::Target::OwnSample(_) => Ok(()),
+    }
+}
+
 /// What a field must be, where the core's word for it has no limits.
 fn rule(field: &str, error: InvalidSample) -> String {
     let path = field.split(' ').next().unwrap_or_default();
@@ -102,14 +128,20 @@ fn rule(field: &str, error: InvalidSample) -> String {
         (InvalidSample::InvalidDescriptor, _) => format!(
             "must be {DESCRIPTOR_LEN_MIN} to {DESCRIPTOR_LEN_MAX} numbers that are not all zero"
         ),
-        (InvalidSample::InvalidLabel, "channel") => format!(
-            "must be a name: 1 to {NAME_BYTES_MAX} of A-Z a-z 0-9 _ . -, the first a letter or digit"
-        ),
-        (InvalidSample::InvalidLabel, "label") => {
+        (InvalidSample::InvalidLabel, "channel") => name_rule(),
+        (InvalidSample::InvalidLabel, "target") if field.contains("{\"agent\":") => name_rule(),
+        (InvalidSample::InvalidLabel, "label" | "target") => {
             format!("must be 1 to {LABEL_BYTES_MAX} bytes without control characters")
         }
         _ => error.to_string(),
     }
+}
+
+/// What a name of an agent or a channel is.
+fn name_rule() -> String {
+    format!(
+        "must be a name: 1 to {NAME_BYTES_MAX} of A-Z a-z 0-9 _ . -, the first a letter or digit"
+    )
 }
 
 /// The field of a motion that is asked about.
@@ -235,11 +267,14 @@ fn in_level(level: &wire::Level) -> Fault {
 
 fn in_descriptor(body: &wire::Descriptor) -> Fault {
     let alone = Label::new("view").and_then(|label| Descriptor::new(label, &body.vector));
-    // All of its numbers would hide what is said.
-    let length = format!("of {} numbers", body.vector.len());
     Fault(None)
         .or("channel", &body.channel, check_name(&body.channel))
-        .or("vector", &format_args!("{length}"), alone)
+        // All of its numbers would hide what is said.
+        .or_said(
+            "vector",
+            || format!("of {} numbers", body.vector.len()),
+            alone,
+        )
 }
 
 fn pose(translation_m: [f64; 3], rotation_xyzw: [f64; 4]) -> Result<StartPose, InvalidSample> {

@@ -27,7 +27,7 @@ pub enum InvalidPrediction {
     #[error("agent is {0:?}, which is another one than in the path")]
     OtherAgent(String),
     /// Nobody knows where the agent is.
-    #[error("the agent is lost: it is not known where it stands in the map")]
+    #[error("it is not known where the agent stands in the map; its status says when it is")]
     NotPlaced,
 }
 

@@ -5,7 +5,7 @@ use cognitive_map::{Agent, AgentId, CognitiveMap, Status};
 use geometry::upper_triangle;
 
 use super::trajectory::stamped;
-use super::{FRAME, OWN_FRAME};
+use super::{FRAME, UNPLACED_FRAME};
 
 /// The estimate of an agent by the owner of a term; nothing before the agent's first sample.
 pub(crate) fn estimate(
@@ -28,7 +28,12 @@ pub(crate) fn estimate(
         session: agent.session(),
         seq: agent.next_seq().saturating_sub(1),
         stamp_ns,
-        frame: if map.is_in_map(id) { FRAME } else { OWN_FRAME }.to_owned(),
+        frame: if map.is_in_map(id) {
+            FRAME
+        } else {
+            UNPLACED_FRAME
+        }
+        .to_owned(),
         map_revision: map.revision(),
         status: status(map.status(id)?),
         translation_m: pose.translation_m,

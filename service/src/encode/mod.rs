@@ -55,4 +55,4 @@ pub use way_graph::{RouteGraph, graphml, nav2};
 pub const FRAME: &str = "map";
 
 /// Frame of the estimate of an agent that nothing ties to the map.
-pub const OWN_FRAME: &str = "odom";
+pub const UNPLACED_FRAME: &str = "unplaced";

@@ -154,14 +154,25 @@ fn of_path(text: &str) -> String {
     let value = value.and_then(|rest| rest.strip_suffix("` to a `u64`"));
     value.map_or_else(
         || text.to_owned(),
-        |value| format!("{value:?} is not a number, by which such a memory is called"),
+        |value| format!("{value:?} is not a whole number from 0 to {}", u64::MAX),
     )
 }
 
 /// What axum says of query parameters.
 fn of_query(text: &str) -> String {
     text.trim_start_matches("Failed to deserialize query string: ")
-        .replace("invalid digit found in string", "expected a whole number")
+        .replace(
+            "invalid digit found in string",
+            "expected a whole number from 0 on",
+        )
+        .replace(
+            "cannot parse integer from empty string",
+            "expected a whole number",
+        )
+        .replace(
+            "number too large to fit in target type",
+            "the number is too large",
+        )
         .replace("invalid float literal", "expected a number")
 }
 

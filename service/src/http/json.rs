@@ -30,7 +30,7 @@ pub(crate) fn message<T: DeserializeOwned + Serialize>(bytes: &[u8]) -> Result<T
             path.join(".")
         };
         return Err(malformed(format!(
-            "{field}: an array where an object should be"
+            "{field}: expected an object, not a list"
         )));
     }
     Ok(message)

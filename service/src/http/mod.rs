@@ -84,7 +84,7 @@ use tracking::TrackedRoutes;
 #[openapi(
     info(title = "cogmap", description = "Shared spatial memory for robot teams. Units are SI, \
         angles radians, stamps nanoseconds of the sensor's clock, quaternions [x, y, z, w]; \
-        positions are in the frame `map` of their space."),
+        positions are in the frame `map` of their space, where no other `frame` is named."),
     tags(
         (name = "spaces", description = "Spaces, their events and exports"),
         (name = "agents", description = "Where agents are, where they were, and their samples"),

@@ -11,7 +11,8 @@ use super::log::{Damage, Extent, Flaw, Survey};
 pub enum StoreError {
     /// Another process holds the directory.
     #[error(
-        "{0} is in use by another process: stop that service first, or choose another directory with --data-dir"
+        "{0} is in use by another process: stop that service first, or choose another directory \
+        with --data-dir"
     )]
     Locked(String),
     /// The directory was written by a newer version.

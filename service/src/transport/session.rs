@@ -111,11 +111,15 @@ pub(crate) fn open_endpoints(settings: &TransportSettings) -> Result<Vec<&str>, 
     let config = config(settings)?;
     let is_set = |key| config.get_json(key).is_ok_and(|value| value != "null");
     let asks_certificates = config.get_json(MTLS).is_ok_and(|value| value == "true");
-    if is_set(PASSWORDS) || asks_certificates {
+    if is_set(PASSWORDS) {
         return Ok(Vec::new());
     }
+    let is_open = |endpoint: &&str| {
+        let shows_certificate = asks_certificates && endpoint.starts_with("tls/");
+        is_reachable(endpoint) && !shows_certificate
+    };
     let listen = settings.listen.iter().map(String::as_str);
-    Ok(listen.filter(|endpoint| is_reachable(endpoint)).collect())
+    Ok(listen.filter(is_open).collect())
 }
 
 /// Opens the session. Scouting by multicast is off: who talks to whom is written down.

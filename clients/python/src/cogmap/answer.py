@@ -97,8 +97,8 @@ class Estimate(UncertainPoseReadings):
     seq: int
     #: Stamp of that sample [ns].
     stamp_ns: int
-    #: Frame of the pose: `map`; or `odom` while the agent is lost and nothing ties it to the map, a
-    #: frame of its own that begins where it began to be lost.
+    #: Frame of the pose: `map`; or `unplaced` while the agent is lost and nothing ties it to the
+    #: map, another frame, which agents that have found one another share.
     frame: str
     #: Number of records that the map includes.
     map_revision: int
@@ -118,10 +118,13 @@ class Estimate(UncertainPoseReadings):
     #: on one machine.
     term: int = 0
 
+    def _frame_text(self) -> str:
+        return "" if self.frame == "map" else f", {self.frame}"
+
     def __str__(self) -> str:
         place = "" if self.place is None else f", place {self.place} ({self.confidence:.2f})"
         return (
-            f"{self.agent} {self.status.value} in {self.space}: "
+            f"{self.agent} {self.status.value} in {self.space}{self._frame_text()}: "
             f"{self._uncertain_pose_text()}{place}, sample {self.seq}"
         )
 
@@ -171,8 +174,8 @@ class IngestAnswer:
     watermark: Watermark
     #: Samples of the request that had been there before.
     duplicates: int
-    #: Why samples of the request are refused by what they say, the first 16 of them: field, value
-    #: and rule.
+    #: Why samples of the request make no sense by themselves, the first 16 of them: field, value
+    #: and rule. Stamps that run backwards are in the watermark alone.
     refused: Tuple[str, ...] = ()
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import operator
 import unicodedata
-from typing import Any, Iterable, Tuple, TypeVar
+from typing import Any, Iterable, Mapping, Tuple, TypeVar
 
 from .errors import InvalidValue
 from .limits import LABEL_BYTES_MAX
@@ -101,8 +101,8 @@ def counted(name: str, items: Tuple[_T, ...], most: int) -> Tuple[_T, ...]:
 
 
 def listed(name: str, items: Iterable[_T]) -> Tuple[_T, ...]:
-    """`items` as a tuple, if they are several; a text is one."""
-    if isinstance(items, (str, bytes)) or not isinstance(items, Iterable):
+    """`items` as a tuple, if they are a list of some kind; a text and a mapping are none."""
+    if isinstance(items, (str, bytes, Mapping)) or not isinstance(items, Iterable):
         raise InvalidValue(name, items, "expected a list")
     return tuple(items)
 

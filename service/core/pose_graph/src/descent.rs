@@ -138,3 +138,6 @@ impl NormalEquations<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

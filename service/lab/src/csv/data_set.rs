@@ -179,6 +179,8 @@ fn for_each_line(
     text: &str,
     mut each: impl FnMut(&[&str]) -> Result<(), TableReason>,
 ) -> Result<(), TableError> {
+    // Spreadsheets begin a text with a byte order mark.
+    let text = text.trim_start_matches('\u{feff}');
     let first = text.lines().next();
     if let Some(found) = first.filter(|first| !first.starts_with(header)) {
         return Err(TableError::Header {

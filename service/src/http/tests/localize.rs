@@ -198,12 +198,15 @@ async fn more_than_there_is_room_for_are_told_to_come_back() {
 }
 
 #[tokio::test]
-async fn a_newcomer_is_in_a_frame_of_its_own() {
+async fn a_newcomer_is_not_in_the_frame_of_the_map() {
     let rig = rig();
     for agent in ["rover", "newcomer"] {
         rig.samples(agent, &steps(1, 0, 3)).await.good();
     }
-    for (agent, status, frame) in [("rover", "localized", "map"), ("newcomer", "lost", "odom")] {
+    for (agent, status, frame) in [
+        ("rover", "localized", "map"),
+        ("newcomer", "lost", "unplaced"),
+    ] {
         let path = format!("/v1/spaces/lab/agents/{agent}");
         let estimate = rig.get(&path).await.good()["estimate"].clone();
         assert_eq!(

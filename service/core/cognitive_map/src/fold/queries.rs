@@ -96,8 +96,8 @@ impl CognitiveMap {
         self.estimator.covariance(agent.0)
     }
 
-    /// Whether an agent's pose is one in the map. That of another one is in a frame of its own,
-    /// which begins where it began to be lost.
+    /// Whether an agent's pose is one in the map. That of another one is in another frame, which
+    /// agents that have found one another share.
     pub fn is_in_map(&self, agent: AgentId) -> bool {
         self.estimator.is_in_map(agent.0)
     }

@@ -244,7 +244,7 @@ pub(super) const REFINED_MATCHING: Matching = Matching {
 };
 
 /// Least distance between keyframes where there are too many to match views by, in the range of the
-/// channel: half the standard deviation of a match.
+/// channel: half the standard deviation of a match. Two maps whose keyframes lie within it are one.
 pub(super) const MATCHED_STEP: f64 = 0.25;
 
 /// Step beyond which a longer one would thin a map no further \[m\]: what is left by then are

@@ -109,11 +109,11 @@ impl RelaxationCopy {
         range_m: f64,
         margin_nats: f64,
     ) -> Vec<Matched> {
+        let all: ViewMatches = channels.iter().flat_map(Similarity::matches).collect();
         let by_odometry = { matching.veers.iter() }.map(|&veer| self.dead_reckoned(veer));
         let mut starts: Vec<Matched> = Vec::new();
         for start in std::iter::once(self.clone()).chain(by_odometry) {
-            let all: Vec<ViewMatch> = channels.iter().flat_map(Similarity::matches).collect();
-            let start = start.with_matches(all.into(), matching.widths, channels);
+            let start = start.with_matches(Arc::clone(&all), matching.widths, channels);
             let is_same = |other: &Matched| other.is_within(&start, tuning::MATCHED_STEP * range_m);
             if !starts.iter().any(is_same) {
                 starts.push(start);
