@@ -1,6 +1,8 @@
 //! Which field breaks a rule, for whoever asked. Each field is tried by itself by the rules that
 //! refused the whole; so nothing is decided here, and what makes sense pays nothing for it.
 
+use std::fmt::Debug;
+
 use cogmap_proto as wire;
 use cogmap_proto::limits::{
     DESCRIPTOR_LEN_MAX, DESCRIPTOR_LEN_MIN, DURATION_S_MAX, LABEL_BYTES_MAX, METRES_MAX,
@@ -27,16 +29,20 @@ struct Fault(Option<String>);
 
 impl Fault {
     /// Goes on to the next field: its name and value, and what the rules say of it alone.
-    fn or<T, E>(self, name: &str, value: &impl Serialize, alone: Result<T, E>) -> Self {
-        self.or_said(name, || shown(value), alone)
-    }
-
-    /// The same with what is said of the value.
-    fn or_said<T, E>(self, name: &str, said: impl FnOnce() -> String, alone: Result<T, E>) -> Self {
+    fn or<T, E>(self, name: &str, value: &dyn Debug, alone: Result<T, E>) -> Self {
         match (self.0, alone) {
-            (None, Err(_)) => Self(Some(format!("{name} {}", said()))),
+            (None, Err(_)) => Self(Some(format!("{name} {}", cut(&format!("{value:?}"))))),
             (found, _) => Self(found),
         }
+    }
+
+    /// The same of a value with fields of its own, which is shown as JSON.
+    fn or_json<T, E>(self, name: &str, value: &impl Serialize, alone: Result<T, E>) -> Self {
+        let shown = match alone {
+            Err(_) => serde_json::to_string(value).unwrap_or_default(),
+            Ok(_) => String::new(),
+        };
+        self.or(name, &format_args!("{shown}"), alone)
     }
 
     /// The path of the field and its value, or the path of the whole.
@@ -48,14 +54,12 @@ impl Fault {
     }
 }
 
-/// A value as JSON, as far as a line shows it.
-fn shown(value: &impl Serialize) -> String {
-    let whole = serde_json::to_string(value).unwrap_or_default();
-    let mut text: String = whole.chars().take(SHOWN_MAX).collect();
-    if text.len() < whole.len() {
-        text.push('…');
+/// A text as far as a line shows it.
+fn cut(text: &str) -> String {
+    match text.char_indices().nth(SHOWN_MAX) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
     }
-    text
 }
 
 /// The field of a sample.
@@ -66,8 +70,8 @@ pub(super) fn in_sample(sample: &wire::Sample) -> String {
         wire::SampleBody::Level(level) => in_level(level).within("body.level"),
         wire::SampleBody::Descriptor(body) => in_descriptor(body).within("body.descriptor"),
         wire::SampleBody::Sighting(body) => Fault(None)
-            .or("target", &body.target, name_of(&body.target))
-            .or("relation", &body.relation, relation(&body.relation))
+            .or_json("target", &body.target, name_of(&body.target))
+            .or_json("relation", &body.relation, relation(&body.relation))
             .within("body.sighting"),
         wire::SampleBody::StartPose(body) => Fault(None)
             .or(
@@ -80,7 +84,7 @@ pub(super) fn in_sample(sample: &wire::Sample) -> String {
                 &body.rotation_xyzw,
                 pose([0.0; 3], body.rotation_xyzw),
             )
-            .or("noise", &body.noise, noise(body.noise))
+            .or_json("noise", &body.noise, noise(body.noise))
             .within("body.start_pose"),
         wire::SampleBody::Marker(marker) => Fault(None)
             .or("label", &marker.label, Label::new(&marker.label))
@@ -180,9 +184,9 @@ pub(super) fn in_contact(at: usize, contact: &wire::Contact) -> String {
     let channels = check_channels(std::slice::from_ref(contact));
     Fault(None)
         .or("position_m", &contact.position_m, position)
-        .or("normal", &contact.normal, normal.transpose())
+        .or_json("normal", &contact.normal, normal.transpose())
         .or("drift_sd_m", &contact.drift_sd_m, drift)
-        .or(
+        .or_json(
             "levels",
             &contact.levels,
             channels.map_err(|(_, error)| error).and(felt),
@@ -230,7 +234,7 @@ fn in_increment(body: &wire::Increment) -> Fault {
     Fault(None)
         .or("translation_m", &body.translation_m, moved)
         .or("rotation_xyzw", &body.rotation_xyzw, turned)
-        .or("noise", &body.noise, noise(body.noise))
+        .or_json("noise", &body.noise, noise(body.noise))
 }
 
 fn in_velocity(body: &wire::Velocity) -> Fault {
@@ -249,7 +253,7 @@ fn in_velocity(body: &wire::Velocity) -> Fault {
             Motion::from_velocity(still, angular, 0.0, None),
         )
         .or("duration_s", &body.duration_s, held)
-        .or("noise", &body.noise, noise(body.noise))
+        .or_json("noise", &body.noise, noise(body.noise))
 }
 
 fn in_level(level: &wire::Level) -> Fault {
@@ -262,7 +266,7 @@ fn in_level(level: &wire::Level) -> Fault {
             &level.offset_m,
             alone(0.0, level.offset_m, None),
         )
-        .or("normal", &level.normal, alone(0.0, [0.0; 3], level.normal))
+        .or_json("normal", &level.normal, alone(0.0, [0.0; 3], level.normal))
 }
 
 fn in_descriptor(body: &wire::Descriptor) -> Fault {
@@ -270,9 +274,9 @@ fn in_descriptor(body: &wire::Descriptor) -> Fault {
     Fault(None)
         .or("channel", &body.channel, check_name(&body.channel))
         // All of its numbers would hide what is said.
-        .or_said(
+        .or(
             "vector",
-            || format!("of {} numbers", body.vector.len()),
+            &format_args!("of {} numbers", body.vector.len()),
             alone,
         )
 }
