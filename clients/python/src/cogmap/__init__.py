@@ -8,7 +8,6 @@ from .answer import (
     AgentDetail,
     AgentPage,
     AgentSummary,
-    Estimate,
     ExpectedDescriptor,
     ExpectedLevel,
     GridModuleState,
@@ -29,7 +28,6 @@ from .answer import (
     SkipReason,
     SpaceInfo,
     SpaceList,
-    Status,
     Trip,
     TripDetail,
     TripEnd,
@@ -52,6 +50,7 @@ from .errors import (
     WindowFull,
     WireError,
 )
+from .estimate import Estimate, Status
 from .evidence import Evidence
 from .event import (
     AgentEnrolled,

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Callable, Iterator, Union
 
 from . import bounds
-from .answer import Estimate, Watermark
+from .answer import Watermark
+from .estimate import Estimate
 from .inbox import Inbox
 from .problem import Problem
 from .wake import Wake

@@ -6,7 +6,8 @@ import logging
 import weakref
 from typing import Callable, List, TypeVar
 
-from .answer import Estimate, Rejection
+from .answer import Rejection
+from .estimate import Estimate
 
 _log = logging.getLogger("cogmap")
 

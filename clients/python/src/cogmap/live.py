@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
-from .answer import Status
+from .estimate import Status
 from .event import EventRecord, MissedEvents
 from .sample import Target
 from .vector import Quaternion, Vec3

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
-from .answer import Status
+from .estimate import Status
 from .limits import BATCH_SAMPLES_MAX
 from .pose import UncertainPoseReadings
 from .sample import Sample

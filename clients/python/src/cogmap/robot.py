@@ -11,9 +11,10 @@ from typing import Callable, Iterable, Optional, Tuple, Type, Union
 
 import zenoh
 
-from .answer import Estimate, Rejection, Watermark
+from .answer import Rejection, Watermark
 from .credentials import Credentials
 from .errors import ClockWarning, CogmapError, InvalidValue, Timeout
+from .estimate import Estimate
 from .key import check_name
 from .link import DEFAULT_ENDPOINT, endpoints_of, open_session
 from .listeners import Listeners

@@ -16,7 +16,7 @@ from typing import Callable, Optional
 import zenoh
 
 from . import bounds
-from .answer import Estimate, SeqRange, Watermark
+from .answer import SeqRange, Watermark
 from .clock import SessionClock
 from .connection import Connection
 from .ending import begins, has_ended
@@ -28,6 +28,7 @@ from .errors import (
     Unreachable,
     WindowFull,
 )
+from .estimate import Estimate
 from .fork import zenoh_begins
 from .incoming import Incoming, is_news
 from .listeners import Listeners, WeakListeners
