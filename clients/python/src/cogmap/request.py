@@ -8,7 +8,7 @@ import urllib.parse
 from typing import Any, Optional
 
 from .errors import InvalidValue
-from .scalar import COUNT_RANGE, text, whole
+from .scalar import COUNT_RANGE, STAMP_RANGE, text, whole
 from .wire import to_wire
 
 
@@ -24,7 +24,7 @@ def path_of(*segments: str) -> str:
 
 def id_of(name: str, number: int) -> str:
     """The number of a memory, as it is in a path. Which there are, the service says."""
-    return str(whole(name, number, COUNT_RANGE))
+    return str(whole(name, number, (STAMP_RANGE[0], COUNT_RANGE[1])))
 
 
 def json_of(name: str, value: Any) -> bytes:
