@@ -1,7 +1,6 @@
 //! Likelihood of a contact's percepts at the places of a model.
 
 use nalgebra::UnitQuaternion;
-use pulp::Arch;
 
 use crate::contact::{Contact, LevelReading};
 use crate::index::packed_places::{
@@ -209,14 +208,11 @@ impl PerceptLikelihood<'_> {
                 noise,
                 scale,
             } => {
-                let all = &mut out[..];
-                Arch::new().dispatch(
+                simd::dispatch(
                     #[inline(always)]
-                    move || {
-                        // Given away, so that it is inlined: see `Shortlist::choose`.
-                        let all = all;
+                    || {
                         for ((likelihood, level), variance) in
-                            all.iter_mut().zip(levels).zip(variances)
+                            out.iter_mut().zip(levels).zip(variances)
                         {
                             *likelihood = level_likelihood(value - level, variance + noise, scale);
                         }
@@ -230,11 +226,9 @@ impl PerceptLikelihood<'_> {
             }
         }
         if let Some(normal_percept) = &self.normal_percept {
-            Arch::new().dispatch(
+            simd::dispatch(
                 #[inline(always)]
-                move || {
-                    // Given away, so that it is inlined: see `Shortlist::choose`.
-                    let out = out;
+                || {
                     for (likelihood, normal) in out.iter_mut().zip(normals) {
                         *likelihood *= normal_percept.likelihood(normal);
                     }

@@ -3,8 +3,6 @@
 //! Every entry is summed in one fixed order, whatever vectors the compiler chooses: the bits do not
 //! depend on it.
 
-use pulp::Arch;
-
 /// Numbers of a row that are computed at once: four vectors of AVX2.
 pub(crate) const LANES: usize = 16;
 
@@ -36,7 +34,7 @@ impl Lower {
             entries: vec![0.0; n * n],
             inverse: Vec::with_capacity(n),
         };
-        let is_definite = Arch::new().dispatch(
+        let is_definite = simd::dispatch(
             #[inline(always)]
             || {
                 let mut above = Vec::with_capacity(n);
@@ -93,7 +91,7 @@ impl Lower {
 
     /// Solves L X = B in place.
     pub(crate) fn forwards(&self, rows: &mut [Row]) {
-        Arch::new().dispatch(
+        simd::dispatch(
             #[inline(always)]
             || self.forwards_inline(rows),
         );

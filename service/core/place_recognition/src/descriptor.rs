@@ -1,7 +1,5 @@
 //! Similarity of two descriptors.
 
-use pulp::Arch;
-
 /// Sums of a scalar product that grow side by side, so that the compiler may use vector registers:
 /// a single sum has an order of additions that it has to keep.
 const LANES: usize = 16;
@@ -10,7 +8,7 @@ const LANES: usize = 16;
 /// the same in any.
 #[inline]
 pub fn dot(a: &[f32], b: &[f32]) -> f32 {
-    Arch::new().dispatch(
+    simd::dispatch(
         #[inline(always)]
         || dot_inline(a, b),
     )

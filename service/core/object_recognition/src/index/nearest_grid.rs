@@ -1,7 +1,5 @@
 //! Nearest-place grid: the nearest place for each cell of a box (a feature transform).
 
-use pulp::Arch;
-
 use crate::index::block_grid::{BlockGrid, NONE, cell};
 use crate::numeric::floor_u32;
 use crate::tuning::NEAREST_CELLS_MAX;
@@ -101,10 +99,10 @@ impl NearestGrid {
         let (rows, per_m) = (self.rows, self.per_m);
         let [fx, fy, fz] = std::array::from_fn(|axis| shift[axis] - self.low[axis]);
         let [lx, ly, lz] = self.size.map(|size| size - 1.0);
-        Arch::new().dispatch(
+        simd::dispatch(
             #[inline(always)]
             || {
-                for (((x, y), z), out) in x.iter().zip(y).zip(z).zip(out) {
+                for (((x, y), z), out) in x.iter().zip(y).zip(z).zip(&mut *out) {
                     let (x, y, z) = ((x + fx) * per_m, (y + fy) * per_m, (z + fz) * per_m);
                     *out = cell([rounded(x, lx), rounded(y, ly), rounded(z, lz)], rows);
                 }

@@ -1,7 +1,6 @@
 //! Shortlist: the places about a point, of which searches at neighbouring points choose.
 
 use nalgebra::{Point3, Vector3};
-use pulp::Arch;
 
 use crate::index::packed_places::PackedPlaces;
 use crate::numeric::to_f32;
@@ -37,7 +36,6 @@ struct Block {
 /// depend on the searches before.
 #[derive(Debug, Default)]
 pub(crate) struct Shortlist {
-    arch: Arch,
     /// Every place in this ball is listed, and every wide place wherever it is. None before the
     /// first search in a model.
     ball: Option<(Point3<f64>, f64)>,
@@ -129,7 +127,6 @@ impl Shortlist {
     /// Chooses the listed places within the gate.
     fn choose(&mut self, variance_m2: f32) {
         let Self {
-            arch,
             numbers,
             blocks,
             at,
@@ -138,12 +135,9 @@ impl Shortlist {
         } = self;
         found.clear();
         let gate = to_f32(GATE_SQUARED);
-        arch.dispatch(
+        simd::dispatch(
             #[inline(always)]
-            move || {
-                // Moving `found` makes this closure `FnOnce`, so that it is inlined. An `FnMut` is
-                // called through a function that is not compiled for wide vectors.
-                let found = found;
+            || {
                 for (block, first) in blocks.iter().zip((0_u32..).step_by(LANES)) {
                     let [x, y, z] = &block.axes;
                     let (mut squares, mut variances) = ([0.0; LANES], [0.0; LANES]);

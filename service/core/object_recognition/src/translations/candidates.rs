@@ -1,7 +1,6 @@
 //! Candidates: the places that a touch could be of, given where a hypothesis predicts it.
 
 use nalgebra::{Point3, Vector3};
-use pulp::Arch;
 
 use crate::index::packed_places::PackedPlaces;
 use crate::index::shortlist::Shortlist;
@@ -48,7 +47,6 @@ impl Candidate {
 /// Buffers of a search, used again for every hypothesis.
 #[derive(Debug, Default)]
 pub(crate) struct CandidateSearch {
-    arch: Arch,
     shortlist: Shortlist,
     /// Densities of the places that the shortlist found last.
     densities: Vec<f64>,
@@ -179,14 +177,12 @@ impl CandidateSearch {
     fn weigh<const N: usize>(
         &self,
         locals: [&PerceptLikelihood<'_>; N],
-        visit: impl FnMut([f64; N]),
+        mut visit: impl FnMut([f64; N]),
     ) -> [f64; N] {
         let all = self.shortlist.found();
-        self.arch.dispatch(
+        simd::dispatch(
             #[inline(always)]
-            move || {
-                // Given away, so that it is inlined: see `Shortlist::choose`.
-                let mut visit = visit;
+            || {
                 let mut totals = [0.0; N];
                 for some in all.chunks(LANES) {
                     // Results of the unused lanes are dropped.

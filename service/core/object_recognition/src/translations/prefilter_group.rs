@@ -4,7 +4,6 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::UnitQuaternion;
-use pulp::Arch;
 
 use crate::contact::Contact;
 use crate::index::nearest_grid::NearestGrid;
@@ -193,12 +192,12 @@ impl PrefilterGroup {
         let peak = share(indexed.places.len()) / (touch.outlier * area * area.sqrt());
         let peak = to_f32(peak);
         let (weights, Scratch { squares, found, .. }) = (&mut self.weights, lists);
-        Arch::new().dispatch(
+        simd::dispatch(
             #[inline(always)]
             || {
-                let places = squares.iter().zip(found);
+                let places = squares.iter().zip(&mut *found);
                 for ((weight, supported), (square, likelihood)) in
-                    weights.iter_mut().zip(supported).zip(places)
+                    weights.iter_mut().zip(&mut *supported).zip(places)
                 {
                     let gain = peak * *likelihood * exp(per * square);
                     let gain = if gain < GAIN_MAX { gain } else { GAIN_MAX };
@@ -260,11 +259,11 @@ impl PrefilterGroup {
     /// Multiplies all weights and sums them up; those below `least` become 0.
     fn scale(&mut self, by: f32, least: f32) {
         let (weights, rest) = self.weights.as_chunks_mut::<8>();
-        let mut sums = Arch::new().dispatch(
+        let mut sums = simd::dispatch(
             #[inline(always)]
             || {
                 let mut sums = Sums::default();
-                for weights in weights {
+                for weights in weights.iter_mut() {
                     sums.add(weights, by, least);
                 }
                 sums

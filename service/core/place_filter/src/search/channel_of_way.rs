@@ -1,7 +1,6 @@
 //! What the levels of a way say at a pose: the field at all of its nodes at once.
 
 use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
-use pulp::Arch;
 
 use super::points::{Lanes, Points, put_from};
 use crate::field::Field;
@@ -170,7 +169,7 @@ impl ChannelOfWay {
             slopes: [[0.0; LANES]; 3],
         };
         let mut to_points = vec![[0.0; LANES]; self.supports.len()];
-        Arch::new().dispatch(
+        simd::dispatch(
             #[inline(always)]
             || self.fill(&points, &mut to_points, &mut expected),
         );

@@ -6,7 +6,6 @@ use geometry::{OUT_OF_PLANE, se3};
 use nalgebra::{
     DMatrix, Isometry3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector2, Vector3, Vector6,
 };
-use pulp::Arch;
 
 use super::Seeker;
 use super::channel_of_way::{ChannelOfWay, channels, density, symmetric};
@@ -237,7 +236,7 @@ impl<'a> Way<'a> {
         let mut factor = expected.covariance;
         let mut inverse = [0.0; LANES];
         let mut products = [[0.0; LANES]; RESIDUAL + 1];
-        let is_definite = Arch::new().dispatch(
+        let is_definite = simd::dispatch(
             #[inline(always)]
             || {
                 let is_definite = factor_upper(&mut factor, &mut inverse, rows.len());

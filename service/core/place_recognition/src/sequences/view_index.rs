@@ -14,7 +14,6 @@
 use std::ops::RangeInclusive;
 
 use nalgebra::Point3;
-use pulp::Arch;
 use state::PagedVec;
 
 use crate::views::StoredView;
@@ -130,7 +129,7 @@ impl ViewIndex {
         let query = Coarse::of(vector);
         let wide: Vec<i16> = query.codes.iter().map(|code| i16::from(*code)).collect();
         let mut found = Vec::new();
-        Arch::new().dispatch(
+        simd::dispatch(
             #[inline(always)]
             || {
                 let first = from / VIEWS;

@@ -1,7 +1,6 @@
 //! One clique of the elimination: a dense piece of the factor, and what it leaves to its parent.
 
 use nalgebra::Matrix6;
-use pulp::Arch;
 
 use super::dense;
 
@@ -94,9 +93,9 @@ impl Clique {
     }
 
     /// Factors the assembled front. Returns the number of directions about which it says nothing.
-    pub(super) fn factor(&mut self, arch: Arch) -> usize {
+    pub(super) fn factor(&mut self) -> usize {
         let (n_pivots, n_rows) = (self.n_pivots(), self.n_rows());
-        dense::factor(arch, &mut self.entries, self.ld, n_pivots, n_rows)
+        dense::factor(&mut self.entries, self.ld, n_pivots, n_rows)
     }
 
     /// Adds what a child leaves.

@@ -6,8 +6,6 @@
 //! entry is summed in one fixed order, whatever vector width the compiler chooses: the bits do not
 //! depend on it.
 
-use pulp::Arch;
-
 /// Rows that are computed at once.
 pub(super) const LANES: usize = 8;
 
@@ -44,24 +42,17 @@ pub(super) fn leading_dimension(n_rows: usize) -> usize {
 ///
 /// A pivot that is not above the noise of its own cancellation is fixed: its unknown gets no
 /// correction. Returns the number of such pivots.
-pub(super) fn factor(
-    arch: Arch,
-    matrix: &mut [f64],
-    ld: usize,
-    n_pivots: usize,
-    n_columns: usize,
-) -> usize {
+pub(super) fn factor(matrix: &mut [f64], ld: usize, n_pivots: usize, n_columns: usize) -> usize {
     let diagonal: Vec<f64> = (0..n_pivots).map(|k| matrix[k * ld + k]).collect();
     let mut n_fixed = 0;
-    factor_columns(arch, matrix, ld, 0, n_pivots, &diagonal, &mut n_fixed);
-    subtract_products(arch, matrix, ld, 0..n_pivots, n_pivots..n_columns);
+    factor_columns(matrix, ld, 0, n_pivots, &diagonal, &mut n_fixed);
+    subtract_products(matrix, ld, 0..n_pivots, n_pivots..n_columns);
     n_fixed
 }
 
 /// Factors the columns `from..to`, into which all earlier ones have been subtracted, by halves: so
 /// nearly all work is done by [`subtract_products`] on columns that are still in the cache.
 fn factor_columns(
-    arch: Arch,
     matrix: &mut [f64],
     ld: usize,
     from: usize,
@@ -71,9 +62,9 @@ fn factor_columns(
 ) {
     if to - from > COLUMNS_MIN {
         let middle = from + (to - from) / 2;
-        factor_columns(arch, matrix, ld, from, middle, diagonal, n_fixed);
-        subtract_products(arch, matrix, ld, from..middle, middle..to);
-        factor_columns(arch, matrix, ld, middle, to, diagonal, n_fixed);
+        factor_columns(matrix, ld, from, middle, diagonal, n_fixed);
+        subtract_products(matrix, ld, from..middle, middle..to);
+        factor_columns(matrix, ld, middle, to, diagonal, n_fixed);
         return;
     }
     for k in from..to {
@@ -105,7 +96,6 @@ fn factor_columns(
 
 /// Subtracts Lₖ Lₖᵀ of the columns `from` from the columns `into`, which lie behind them.
 fn subtract_products(
-    arch: Arch,
     matrix: &mut [f64],
     ld: usize,
     from: std::ops::Range<usize>,
@@ -117,10 +107,13 @@ fn subtract_products(
     let (done, rest) = matrix.split_at_mut(into.start * ld);
     let done = &done[from.start * ld..from.end * ld];
     let columns = &mut rest[..into.len() * ld];
-    arch.dispatch(
+    simd::dispatch(
         #[inline(always)]
         || {
-            for (tile, j) in columns.chunks_mut(TILE * ld).zip(into.step_by(TILE)) {
+            for (tile, j) in columns
+                .chunks_mut(TILE * ld)
+                .zip(into.clone().step_by(TILE))
+            {
                 match tile.len() / ld {
                     1 => subtract_tile::<1>(done, tile, ld, j),
                     2 => subtract_tile::<2>(done, tile, ld, j),

@@ -1,7 +1,5 @@
 //! The tree of cliques: factorisation, refactorisation of a part, solutions.
 
-use pulp::Arch;
-
 use super::amalgamation::amalgamate;
 use super::clique::{Clique, DIMENSION_MAX, Front};
 use super::dense::FIXED;
@@ -50,7 +48,6 @@ pub(crate) struct CliqueTree {
     roots: Vec<u32>,
     /// Scratch: index of a variable in the current clique.
     local: Vec<u32>,
-    arch: Arch,
     n_right: usize,
 }
 
@@ -69,7 +66,6 @@ impl CliqueTree {
             home: vec![NOWHERE; n],
             roots: Vec::new(),
             local: vec![NOWHERE; n],
-            arch: Arch::new(),
             n_right: E::N_RIGHT,
         };
         for stage in stages {
@@ -103,7 +99,6 @@ impl CliqueTree {
             home: self.home.clone(),
             roots: self.roots.clone(),
             local: self.local.clone(),
-            arch: self.arch,
             n_right,
         }
     }
@@ -195,7 +190,7 @@ impl CliqueTree {
             for &variable in &clique.variables {
                 self.local[variable as usize] = NOWHERE;
             }
-            n_fixed += clique.factor(self.arch);
+            n_fixed += clique.factor();
             self.cliques[id as usize] = Some(clique);
         }
         n_fixed
