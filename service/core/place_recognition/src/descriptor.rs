@@ -14,12 +14,13 @@ pub fn dot(a: &[f32], b: &[f32]) -> f32 {
     )
 }
 
+/// As [`dot`], within a dispatch.
 #[expect(
     clippy::inline_always,
     reason = "compiled for the vectors of a dispatch"
 )]
 #[inline(always)]
-fn dot_inline(a: &[f32], b: &[f32]) -> f32 {
+pub(crate) fn dot_inline(a: &[f32], b: &[f32]) -> f32 {
     let (a, a_rest) = a.as_chunks::<LANES>();
     let (b, b_rest) = b.as_chunks::<LANES>();
     let mut sums = [0.0; LANES];

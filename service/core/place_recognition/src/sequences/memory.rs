@@ -10,7 +10,7 @@ use crate::keyframes::SampleKey;
 use crate::similarity::{LoggedView, ViewLog, logged};
 use crate::tuning::memory as tuning;
 use crate::view::View;
-use crate::views::{ChannelModel, Distance, Kernel, SimilarView, StoredView};
+use crate::views::{ChannelModel, Distance, Kernel, Pairs, SimilarView, StoredView};
 use state::{Codec, CorruptState, Counted, PagedVec, State, StateReader, StateWriter};
 
 /// The remembered views of all agents.
@@ -125,27 +125,16 @@ impl ViewMemory {
     /// The similar earlier views, by number, with their distances; and whether one of them makes
     /// the view redundant.
     ///
-    /// A few of a channel are all compared. What unrelated views are like is learned from some of
-    /// many, spread evenly, others with each view, and each for as many as are not. Of the rest
-    /// only those are looked at that may be similar.
+    /// A few of a channel are all compared. Of many, the coarse copies rule out most; what
+    /// unrelated views are like is learned from the copies of some, spread evenly, others with each
+    /// view, and each for as many as are not.
     fn similar_earlier(&mut self, view: &StoredView) -> (Vec<(usize, Distance)>, bool) {
         let model = &mut self.channels[usize::from(view.channel)];
+        let earliest = view.ordinal.saturating_sub(tuning::EARLIER);
+        let is_recent = |number: &usize| self.index.is_since(*number, &view.sample, earliest);
         let mut similar = Vec::new();
         let mut is_known = false;
-        let mut compare = |model: &mut ChannelModel, number: usize, pairs: u32| {
-            let Some(other) = self.stored.get(number) else {
-                return;
-            };
-            let is_recent = other.sample.agent == view.sample.agent
-                && other.sample.session == view.sample.session
-                && other.ordinal.saturating_add(tuning::EARLIER) >= view.ordinal;
-            if other.channel != view.channel || is_recent {
-                return;
-            }
-            let angle_rad = angle_rad(&other.vector, &view.vector);
-            if pairs > 0 {
-                model.learn_unrelated(angle_rad, pairs);
-            }
+        let mut note = |model: &ChannelModel, number: usize, other: &StoredView, angle_rad: f64| {
             if let Some(distance) = model.distance(angle_rad) {
                 // A similar view somewhere else does not make it redundant.
                 let apart_m = (other.in_map - view.in_map).norm();
@@ -154,24 +143,32 @@ impl ViewMemory {
                 similar.push((number, distance));
             }
         };
-        let stride = match self.index.count(view.channel) {
-            0..=tuning::COMPARED => 1,
-            count => count.div_ceil(tuning::DRAWN),
-        };
-        let pairs = u32::try_from(stride).unwrap_or(u32::MAX);
-        let first = view.ordinal as usize % stride;
-        let of_channel = self.index.of_channel(view.channel);
-        let drawn: Vec<usize> = of_channel.skip(first).step_by(stride).collect();
-        for &number in &drawn {
-            compare(model, number, pairs);
-        }
-        if let (2.., Some(cosine)) = (stride, model.similar_cosine()) {
-            let alike = self.index.alike(view.channel, &view.vector, cosine, 0);
-            let is_left = |number: &usize| drawn.binary_search(number).is_err();
-            for number in alike.into_iter().filter(is_left) {
-                compare(model, number, 0);
+        let count = self.index.count(view.channel);
+        if count <= tuning::COMPARED {
+            let of_channel = self.index.of_channel(view.channel);
+            for number in of_channel.filter(|number| !is_recent(number)) {
+                let Some(other) = self.stored.get(number) else {
+                    continue;
+                };
+                let angle_rad = angle_rad(&other.vector, &view.vector);
+                model.learn_unrelated(angle_rad, &Pairs::ONE);
+                note(model, number, other, angle_rad);
             }
-            similar.sort_by_key(|(number, _)| *number);
+        } else if let Some(compared) = self.index.compare(view.channel, &view.vector, 0) {
+            let stride = count.div_ceil(tuning::DRAWN);
+            let pairs = Pairs::new(stride);
+            for (number, angle_rad) in compared.spread(view.ordinal as usize % stride, stride) {
+                if !is_recent(&number) {
+                    model.learn_unrelated(angle_rad, &pairs);
+                }
+            }
+            let cosine = model.similar_cosine().unwrap_or(f32::INFINITY);
+            for number in compared.alike(cosine) {
+                if let (false, Some(other)) = (is_recent(&number), self.stored.get(number)) {
+                    let angle_rad = angle_rad(&other.vector, &view.vector);
+                    note(model, number, other, angle_rad);
+                }
+            }
         }
         if similar.len() > tuning::SIMILAR_MAX {
             similar.sort_by(|a, b| a.1.mean_m.total_cmp(&b.1.mean_m).then(a.0.cmp(&b.0)));
@@ -376,8 +373,10 @@ impl ViewMemory {
     ) -> Vec<SimilarView> {
         let model = self.channels.get(usize::from(channel));
         let cosine = model.and_then(ChannelModel::similar_cosine);
-        let alike = cosine.map(|cosine| self.index.alike(channel, vector, cosine, from));
-        let mut similar: Vec<SimilarView> = { alike.unwrap_or_default().into_iter() }
+        let compared = cosine.and_then(|_| self.index.compare(channel, vector, from));
+        let alike =
+            { compared.as_ref().zip(cosine) }.map(|(compared, cosine)| compared.alike(cosine));
+        let mut similar: Vec<SimilarView> = { alike.into_iter().flatten() }
             .filter_map(|number| self.stored.get(number))
             .filter(|view| !is_left_out(view))
             .filter_map(|view| {

@@ -6,6 +6,7 @@
 //! complete, the distances between both stretches are fitted like those of a trilateration, which
 //! gives the relative pose of the two as far as they determine it.
 
+mod coarse_copies;
 mod memory;
 mod range_alignment;
 mod sequence_match;

@@ -31,6 +31,32 @@ pub(crate) struct ChannelModel {
     teachers: Teachers,
 }
 
+/// Pairs of views that one pair stands for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pairs {
+    /// Part that they leave of what was learned before.
+    kept: f64,
+    /// What they count for together.
+    weight: f64,
+}
+
+impl Pairs {
+    const KEPT: f64 = 1.0 - 1.0 / tuning::UNRELATED;
+
+    /// A pair that stands for itself.
+    pub(crate) const ONE: Self = Self {
+        kept: Self::KEPT,
+        weight: 1.0,
+    };
+
+    /// So many, one at least: each fades those before.
+    pub(crate) fn new(count: usize) -> Self {
+        let kept = (1..count).fold(Self::KEPT, |kept, _| kept * Self::KEPT);
+        let weight = (1.0 - kept) / (1.0 - Self::KEPT);
+        Self { kept, weight }
+    }
+}
+
 /// A distance with its standard deviation \[m\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Distance {
@@ -77,19 +103,16 @@ impl ChannelModel {
         { most_m.reduce(f64::max) }.is_some_and(|most_m| distance_m > most_m)
     }
 
-    /// Learns from two views that are far from one another along the way, which stand for so many
+    /// Learns from two views that are far from one another along the way, which stand for some
     /// pairs: they count as if each of these had the angle.
-    pub(crate) fn learn_unrelated(&mut self, angle_rad: f64, pairs: u32) {
-        const KEPT: f64 = 1.0 - 1.0 / tuning::UNRELATED;
+    pub(crate) fn learn_unrelated(&mut self, angle_rad: f64, pairs: &Pairs) {
         let unrelated = &mut self.unrelated;
         let is_known = unrelated.count() >= tuning::UNRELATED_MIN;
         if is_known && angle_rad < unrelated.mean() - tuning::RELATED * unrelated.sd() {
             return;
         }
-        let kept = (1..pairs).fold(KEPT, |kept, _| kept * KEPT);
-        unrelated.fade(kept);
-        // Σ KEPTᵏ of these pairs
-        unrelated.add(angle_rad, (1.0 - kept) / (1.0 - KEPT));
+        unrelated.fade(pairs.kept);
+        unrelated.add(angle_rad, pairs.weight);
     }
 
     /// Angle beyond which a view is new beside another \[rad\].
@@ -265,7 +288,7 @@ mod tests {
         for step in 0..4000_u32 {
             let distance_m = f64::from(step % 100) * 0.015;
             model.learn(0, distance_m, distance_m);
-            model.learn_unrelated(1.5 + 0.1 * (f64::from(step) * 0.7).sin(), 1);
+            model.learn_unrelated(1.5 + 0.1 * (f64::from(step) * 0.7).sin(), &Pairs::ONE);
         }
         model
     }
@@ -275,9 +298,9 @@ mod tests {
         let (mut many, mut one) = (learned(), learned());
         let angle_rad = 1.42;
         for _ in 0..50 {
-            many.learn_unrelated(angle_rad, 7);
+            many.learn_unrelated(angle_rad, &Pairs::new(7));
             for _ in 0..7 {
-                one.learn_unrelated(angle_rad, 1);
+                one.learn_unrelated(angle_rad, &Pairs::ONE);
             }
         }
         assert!((many.unrelated.mean() - one.unrelated.mean()).abs() < 1e-9);

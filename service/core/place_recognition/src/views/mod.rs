@@ -3,5 +3,5 @@
 mod channel_model;
 mod stored_view;
 
-pub(crate) use channel_model::{ChannelModel, Distance, Kernel, ShortText};
+pub(crate) use channel_model::{ChannelModel, Distance, Kernel, Pairs, ShortText};
 pub(crate) use stored_view::{RecentView, SimilarView, StoredView};

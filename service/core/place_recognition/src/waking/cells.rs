@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use state::{Counted, PagedVec, state_of_struct};
 
 use super::index::{CellIndex, Key};
-use crate::descriptor::dot;
+use crate::descriptor::{dot, dot_inline};
 use crate::tuning::cells as tuning;
 
 /// What was seen in a cell of space on a channel.
@@ -209,29 +209,30 @@ impl Cells {
 
     /// How alike a view is to what was seen about each cell of its channel.
     pub(super) fn alike(&self, channel: u8, vector: &[f32]) -> Vec<Alike> {
-        let products: Vec<(f32, f32)> = { self.all.iter() }
-            .map(|cell| {
-                if cell.channel != channel || cell.sum.len() != vector.len() {
-                    return (0.0, 0.0);
+        let mut products = vec![[0.0; 2]; self.all.len()];
+        simd::dispatch(
+            #[inline(always)]
+            || {
+                for (product, cell) in products.iter_mut().zip(self.all.iter()) {
+                    if cell.channel == channel && cell.sum.len() == vector.len() {
+                        product[0] = dot_inline(&cell.sum, vector);
+                    }
                 }
-                let product = dot(&cell.sum, vector);
-                let cosine = product / cell.length.max(f32::MIN_POSITIVE);
-                let density = cell.weight * (tuning::SHARPNESS * (cosine - 1.0)).exp();
-                (product, density)
-            })
-            .collect();
+            },
+        );
+        for ([product, density], cell) in products.iter_mut().zip(self.all.iter()) {
+            if cell.channel == channel && !cell.sum.is_empty() {
+                let cosine = *product / cell.length.max(f32::MIN_POSITIVE);
+                *density = cell.weight * (tuning::SHARPNESS * (cosine - 1.0)).exp();
+            }
+        }
         let pairs = (0_u32..).zip(self.all.iter()).zip(self.near.iter());
         let own = pairs.filter(|((_, cell), _)| cell.channel == channel);
         own.map(|((number, cell), near)| {
-            let (mut product, mut density) = (0.0, 0.0);
-            for &(other, kernel) in near {
-                let (along, alike) = products[other as usize];
-                product += kernel * along;
-                density += kernel * alike;
-            }
+            let [product, density] = weighted_sums(near, &products);
             let length = cell.about_squared.max(f32::MIN_POSITIVE).sqrt();
             let open = cell.about_weight + tuning::OPEN;
-            let features = [product / length, (density + tuning::LEAST).ln() - open.ln()];
+            let features = [product / length, ((density + tuning::LEAST) / open).ln()];
             Alike {
                 cell: number,
                 features,
@@ -240,10 +241,10 @@ impl Cells {
         .collect()
     }
 
-    /// Number of cells of a channel.
-    pub(super) fn count(&self, channel: u8) -> usize {
-        let cells = self.all.iter();
-        cells.filter(|cell| cell.channel == channel).count()
+    /// Whether a channel has so many cells.
+    pub(super) fn are_as_many(&self, channel: u8, count: usize) -> bool {
+        let mut own = self.all.iter().filter(|cell| cell.channel == channel);
+        own.by_ref().take(count).count() == count
     }
 
     /// Whether cells are of channels, with as many numbers as a channel has, each once.
@@ -310,6 +311,22 @@ pub(super) fn beside(key: Key) -> impl Iterator<Item = Key> {
     let offsets = (-1..=1).flat_map(|x| (-1..=1).map(move |y| (x, y)));
     let offsets = offsets.filter(|offset| *offset != (0, 0));
     offsets.map(move |(x, y)| [key[0] + x, key[1] + y, key[2]])
+}
+
+/// Sums over the cells about one, weighted by the kernel: four side by side, since each sum has an
+/// order of additions that it has to keep.
+fn weighted_sums(near: &[(u32, f32)], all: &[[f32; 2]]) -> [f32; 2] {
+    let mut sums = [[0.0; 2]; 4];
+    let (fours, rest) = near.as_chunks::<4>();
+    for near in fours.iter().map(|four| &four[..]).chain([rest]) {
+        for (sum, &(number, kernel)) in sums.iter_mut().zip(near) {
+            let own = &all[number as usize];
+            sum[0] += kernel * own[0];
+            sum[1] += kernel * own[1];
+        }
+    }
+    let [a, b, c, d] = sums;
+    [0, 1].map(|k| (a[k] + b[k]) + (c[k] + d[k]))
 }
 
 /// Weight of a cell so many squared sides away; `None` beyond the reach.

@@ -254,7 +254,7 @@ impl Waking {
         };
         self.channels[usize::from(channel)].model.is_telling()
             && self.is_best(channel)
-            && self.cells.count(channel) >= tuning::CELLS_LARGE
+            && self.cells.are_as_many(channel, tuning::CELLS_LARGE)
     }
 
     /// Whether an agent was found and is still followed.

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use geometry::PoseCovariance;
-use nalgebra::{Isometry3, Matrix6, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix4, Matrix6x4, Point3, UnitQuaternion, Vector3};
 use random::Seeded;
 use state::{Counted, state_of_struct};
 
@@ -128,10 +128,10 @@ impl Filter {
         ));
         let temper = tuning::TEMPER;
         let weigh = |score: f32| (temper * f64::from(score)).exp();
-        let mean_within = { scores.cells.iter() }
+        let gains: Vec<f64> = { scores.cells.iter() }
             .map(|(_, score)| weigh(*score))
-            .sum::<f64>()
-            / scores.cells.len().max(1) as f64;
+            .collect();
+        let mean_within = gains.iter().sum::<f64>() / gains.len().max(1) as f64;
         let within = scores.within.clamp(tuning::WITHIN.0, tuning::WITHIN.1);
         let numerator = if self.particles.is_empty() {
             let temper_of_draw = temper.max(tuning::FIRST);
@@ -149,20 +149,26 @@ impl Filter {
             if let Some(turn) = turn {
                 self.turn(turn);
             }
-            let outside = (-temper * within).min(0.0) - tuning::HOLE;
-            let mut of_cell = vec![f32::NAN; cells.all.len()];
-            for (cell, score) in &scores.cells {
-                of_cell[*cell as usize] = *score;
+            let outside = ((-temper * within).min(0.0) - tuning::HOLE).exp();
+            let mut of_cell = vec![outside; cells.all.len()];
+            for ((cell, _), gain) in scores.cells.iter().zip(&gains) {
+                if !gain.is_nan() {
+                    of_cell[*cell as usize] = *gain;
+                }
             }
             let mut old = 0.0;
+            // Those that were drawn from one before are mostly in one cell still.
+            let mut last = None;
             for particle in &mut self.particles {
-                let number = cells.find(self.channel, key_of(&particle.position()));
-                let score = number.map_or(f32::NAN, |number| of_cell[number as usize]);
-                let gain = if score.is_nan() {
-                    outside.exp()
-                } else {
-                    weigh(score)
-                };
+                let key = key_of(&particle.position());
+                let known = last.filter(|(known, _)| *known == key);
+                let (_, gain) = *last.insert(known.unwrap_or_else(|| {
+                    let number = cells.find(self.channel, key);
+                    (
+                        key,
+                        number.map_or(outside, |number| of_cell[number as usize]),
+                    )
+                }));
                 #[expect(clippy::cast_possible_truncation, reason = "a weight")]
                 let weight = (f64::from(particle.weight) * gain) as f32;
                 particle.weight = weight;
@@ -270,9 +276,15 @@ impl Filter {
 
     /// Where most particles are; `None` without any.
     pub(super) fn mode(&self, cells: &Cells) -> Option<Mode> {
-        let mut by_key: Vec<([i32; 3], f64)> = { self.particles.iter() }
-            .map(|particle| (key_of(&particle.position()), f64::from(particle.weight)))
-            .collect();
+        // Those that were drawn from one before are mostly in one cell still.
+        let mut by_key: Vec<([i32; 3], f64)> = Vec::new();
+        for particle in &self.particles {
+            let (key, weight) = (key_of(&particle.position()), f64::from(particle.weight));
+            match by_key.last_mut() {
+                Some(last) if last.0 == key => last.1 += weight,
+                _ => by_key.push((key, weight)),
+            }
+        }
         by_key.sort_by_key(|(key, _)| *key);
         by_key.dedup_by(|next, kept| {
             let is_same = next.0 == kept.0;
@@ -333,19 +345,23 @@ impl Filter {
             (sin, cos, whole) = (sin + s * weight, cos + c * weight, whole + weight);
         }
         let turn_rad = sin.atan2(cos);
+        // Of positions and turns in the map.
+        let mut squares = Matrix4::zeros();
+        for (particle, weight) in self.near(middle) {
+            let off = particle.position().coords - middle;
+            let turned = (f64::from(particle.turn_rad) - turn_rad + TAU / 2.0).rem_euclid(TAU);
+            let error = off.push(turned - TAU / 2.0);
+            squares += error * error.transpose() * (weight / whole);
+        }
         let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, turn_rad);
         let rotation = turn * self.in_odom.rotation;
-        let inverse = rotation.inverse();
-        let mut covariance = Matrix6::zeros();
-        for (particle, weight) in self.near(middle) {
-            let off = inverse * (particle.position().coords - middle);
-            let turned = (f64::from(particle.turn_rad) - turn_rad + TAU / 2.0).rem_euclid(TAU);
-            let up = inverse * Vector3::z() * (turned - TAU / 2.0);
-            let mut error = nalgebra::Vector6::zeros();
-            error.fixed_rows_mut::<3>(0).copy_from(&off);
-            error.fixed_rows_mut::<3>(3).copy_from(&up);
-            covariance += error * error.transpose() * (weight / whole);
-        }
+        let to_body = rotation.inverse().to_rotation_matrix().into_inner();
+        let mut jacobian = Matrix6x4::zeros();
+        jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_body);
+        jacobian
+            .fixed_view_mut::<3, 1>(3, 3)
+            .copy_from(&to_body.column(2));
+        let covariance = jacobian * squares * jacobian.transpose();
         let all: f64 = self
             .particles
             .iter()
@@ -353,7 +369,7 @@ impl Filter {
             .sum();
         Mode {
             pose: Isometry3::from_parts((*middle).into(), rotation),
-            covariance: PoseCovariance::from_matrix(&covariance),
+            covariance: PoseCovariance::from_upper_part(&covariance),
             probability: whole / all * (1.0 - self.without),
         }
     }

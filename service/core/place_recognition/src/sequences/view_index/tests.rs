@@ -1,10 +1,9 @@
-//! The index beside a comparison with all.
+//! The index beside a search through all.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use random::Seeded;
 
 use super::*;
-use crate::descriptor::cosine;
 use crate::keyframes::SampleKey;
 
 const NUMBERS: usize = 24;
@@ -43,37 +42,29 @@ fn vector(phase: f64, draws: &mut Seeded) -> Box<[f32]> {
 }
 
 #[test]
-fn no_view_that_is_alike_is_ruled_out_and_most_others_are() {
-    let mut draws = Seeded(7);
-    let views = views(500, &mut draws);
+fn views_of_a_channel_are_numbered_among_all() {
+    let mut draws = Seeded(10);
+    let views = views(300, &mut draws);
     let index = ViewIndex::of(views.iter(), 1);
-    for (cosine_min, from) in [(0.3, 0), (0.8, 100), (0.95, 321), (-1.0, 64), (1.0, 0)] {
-        let (mut alike, mut found) = (0, 0);
-        for query in views.iter().step_by(9) {
-            let numbers = index.alike(query.channel, &query.vector, cosine_min, from);
-            let is_alike = |number: &usize| {
-                let other = &views[*number];
-                other.channel == query.channel
-                    && cosine(&other.vector, &query.vector) >= f64::from(cosine_min)
-            };
-            let expected: Vec<usize> = (from..views.len()).filter(is_alike).collect();
-            assert!(expected.iter().all(|number| numbers.contains(number)));
-            assert!(numbers.is_sorted());
-            (alike, found) = (alike + expected.len(), found + numbers.len());
-        }
-        let most = alike + alike / 10 + 56;
-        assert!(found <= most, "{found} of {alike} at {cosine_min}");
-    }
+    let expected: Vec<usize> = (0..300).filter(|number| number % 3 == 2).collect();
+    assert_eq!(index.of_channel(1).collect::<Vec<_>>(), expected);
+    assert_eq!([0, 1, 2].map(|channel| index.count(channel)), [200, 100, 0]);
+    let compared = index.compare(1, &views[101].vector, 100).expect("views");
+    let alike: Vec<usize> = compared.alike(0.999).collect();
+    assert!(alike.contains(&101) && alike.iter().all(|number| number % 3 == 2));
+    assert!(index.compare(2, &views[0].vector, 0).is_none());
 }
 
 #[test]
-fn a_vector_of_zeros_is_like_none_and_breaks_nothing() {
-    let mut draws = Seeded(8);
-    let mut views = views(3, &mut draws);
-    views[0].vector = vec![0.0; NUMBERS].into();
+fn who_saw_a_view_and_when_is_known_of_each() {
+    let mut draws = Seeded(11);
+    let mut views = views(200, &mut draws);
+    views[150].sample.session = 2;
     let index = ViewIndex::of(views.iter(), 1);
-    assert_eq!(index.alike(0, &[0.0; NUMBERS], 0.5, 0), Vec::<usize>::new());
-    assert_eq!(index.alike(0, &views[1].vector, 0.9, 0), [1]);
+    let since = |number| index.is_since(number, &views[0].sample, 120);
+    let found: Vec<usize> = (0..201).filter(|number| since(*number)).collect();
+    let expected: Vec<usize> = (120..200).filter(|number| *number != 150).collect();
+    assert_eq!(found, expected);
 }
 
 #[test]
