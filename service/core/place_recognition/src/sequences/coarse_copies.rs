@@ -99,29 +99,29 @@ impl CoarseCopies {
         numbers.map(|number| *number as usize)
     }
 
-    /// The copies of the views from a number on beside a vector.
-    pub(super) fn compare(&self, vector: &[f32], from: usize) -> Compared {
+    /// Compares the copies of the views from a number on with a vector; `visit` takes them in
+    /// order, block by block.
+    pub(super) fn compare(&self, vector: &[f32], from: usize, mut visit: impl FnMut(Compared<'_>)) {
         let query = Coarse::of(vector);
         let wide: Vec<i16> = query.codes.iter().map(|code| i16::from(*code)).collect();
-        let mut compared = Compared::with_capacity(self.len);
+        let (mut cosines, mut most) = ([0.0; VIEWS], [0.0; VIEWS]);
         for block in self.blocks.iter() {
             let is_before = |number: &u32| (*number as usize) < from;
             let first = block.numbers.partition_point(is_before);
-            if first == block.numbers.len() {
+            let end = block.numbers.len();
+            if first == end {
                 continue;
             }
-            let mut cosines = [0.0; VIEWS];
-            let mut most = [0.0; VIEWS];
             simd::dispatch(
                 #[inline(always)]
                 || block.compare(&query, &wide, &mut cosines, &mut most),
             );
-            let own = first..block.numbers.len();
-            compared.numbers.extend(&block.numbers[own.clone()]);
-            compared.cosines.extend(&cosines[own.clone()]);
-            compared.most.extend(&most[own]);
+            visit(Compared {
+                numbers: &block.numbers[first..],
+                cosines: &cosines[first..end],
+                most: &most[first..end],
+            });
         }
-        compared
     }
 
     /// Bytes of memory that they take.
@@ -193,38 +193,25 @@ fn product(a: &[i16], b: &[i8]) -> i32 {
     sum
 }
 
-/// Views of a channel beside a vector, by their coarse copies, in the order of their numbers.
-#[derive(Debug)]
-pub(super) struct Compared {
-    numbers: Vec<u32>,
+/// The next views of a channel beside a vector, by their coarse copies.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Compared<'a> {
+    pub(super) numbers: &'a [u32],
     /// Cosines of the copies.
-    cosines: Vec<f32>,
+    cosines: &'a [f32],
     /// The largest that the views themselves may have.
-    most: Vec<f32>,
+    most: &'a [f32],
 }
 
-impl Compared {
-    fn with_capacity(count: usize) -> Self {
-        Self {
-            numbers: Vec::with_capacity(count),
-            cosines: Vec::with_capacity(count),
-            most: Vec::with_capacity(count),
-        }
-    }
-
-    /// Numbers of every so many of the views, from one on, and the angles between the copies
-    /// \[rad\].
-    pub(super) fn spread(&self, first: usize, step: usize) -> impl Iterator<Item = (usize, f64)> {
-        let views = self.numbers.iter().zip(&self.cosines).skip(first);
-        views.step_by(step.max(1)).map(|(number, cosine)| {
-            let angle_rad = f64::from(*cosine).clamp(-1.0, 1.0).acos();
-            (*number as usize, angle_rad)
-        })
+impl Compared<'_> {
+    /// Angle between the copies of one of the views and of the vector \[rad\].
+    pub(super) fn angle_rad(&self, index: usize) -> f64 {
+        f64::from(self.cosines[index]).clamp(-1.0, 1.0).acos()
     }
 
     /// Numbers of the views that may have at least a cosine.
     pub(super) fn alike(&self, cosine: f32) -> impl Iterator<Item = usize> {
-        let views = self.numbers.iter().zip(&self.most);
+        let views = self.numbers.iter().zip(self.most);
         let alike = views.filter(move |(_, most)| {
             // Of what is no number nothing is ruled out.
             let is_less = **most < cosine - ROUNDING;

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use super::coarse_copies::Compared;
 use super::sequence_match::SequenceMatch;
 use super::track::ViewTrack;
 use super::view_index::ViewIndex;
@@ -125,9 +126,9 @@ impl ViewMemory {
     /// The similar earlier views, by number, with their distances; and whether one of them makes
     /// the view redundant.
     ///
-    /// A few of a channel are all compared. Of many, the coarse copies rule out most; what
-    /// unrelated views are like is learned from the copies of some, spread evenly, others with each
-    /// view, and each for as many as are not.
+    /// A few of a channel are all compared. Of many, the coarse copies rule out most, by what was
+    /// known before the view; what unrelated views are like is learned from the copies of some,
+    /// spread evenly, others with each view, and each for as many as are not.
     fn similar_earlier(&mut self, view: &StoredView) -> (Vec<(usize, Distance)>, bool) {
         let model = &mut self.channels[usize::from(view.channel)];
         let earliest = view.ordinal.saturating_sub(tuning::EARLIER);
@@ -154,17 +155,26 @@ impl ViewMemory {
                 model.learn_unrelated(angle_rad, &Pairs::ONE);
                 note(model, number, other, angle_rad);
             }
-        } else if let Some(compared) = self.index.compare(view.channel, &view.vector, 0) {
+        } else {
             let stride = count.div_ceil(tuning::DRAWN);
             let pairs = Pairs::new(stride);
-            for (number, angle_rad) in compared.spread(view.ordinal as usize % stride, stride) {
-                if !is_recent(&number) {
-                    model.learn_unrelated(angle_rad, &pairs);
+            let cosine = model.similar_cosine();
+            let mut next = view.ordinal as usize % stride;
+            let mut alike = Vec::new();
+            let visit = |compared: Compared<'_>| {
+                while let Some(number) = compared.numbers.get(next) {
+                    if !is_recent(&(*number as usize)) {
+                        model.learn_unrelated(compared.angle_rad(next), &pairs);
+                    }
+                    next += stride;
                 }
-            }
-            let cosine = model.similar_cosine().unwrap_or(f32::INFINITY);
-            for number in compared.alike(cosine) {
-                if let (false, Some(other)) = (is_recent(&number), self.stored.get(number)) {
+                next -= compared.numbers.len();
+                alike.extend(cosine.into_iter().flat_map(|cosine| compared.alike(cosine)));
+            };
+            let channel = view.channel;
+            self.index.compare(channel, &view.vector, 0, visit);
+            for number in alike.into_iter().filter(|number| !is_recent(number)) {
+                if let Some(other) = self.stored.get(number) {
                     let angle_rad = angle_rad(&other.vector, &view.vector);
                     note(model, number, other, angle_rad);
                 }
@@ -373,10 +383,12 @@ impl ViewMemory {
     ) -> Vec<SimilarView> {
         let model = self.channels.get(usize::from(channel));
         let cosine = model.and_then(ChannelModel::similar_cosine);
-        let compared = cosine.and_then(|_| self.index.compare(channel, vector, from));
-        let alike =
-            { compared.as_ref().zip(cosine) }.map(|(compared, cosine)| compared.alike(cosine));
-        let mut similar: Vec<SimilarView> = { alike.into_iter().flatten() }
+        let mut alike = Vec::new();
+        if let Some(cosine) = cosine {
+            let visit = |compared: Compared<'_>| alike.extend(compared.alike(cosine));
+            self.index.compare(channel, vector, from, visit);
+        }
+        let mut similar: Vec<SimilarView> = { alike.into_iter() }
             .filter_map(|number| self.stored.get(number))
             .filter(|view| !is_left_out(view))
             .filter_map(|view| {

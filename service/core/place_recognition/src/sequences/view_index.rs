@@ -70,10 +70,17 @@ impl ViewIndex {
         }
     }
 
-    /// The views of a channel from a number on beside a vector.
-    pub(super) fn compare(&self, channel: u8, vector: &[f32], from: usize) -> Option<Compared> {
-        let copies = self.channels.get(usize::from(channel))?;
-        Some(copies.compare(vector, from))
+    /// Compares the views of a channel from a number on with a vector; `visit` takes them in order.
+    pub(super) fn compare(
+        &self,
+        channel: u8,
+        vector: &[f32],
+        from: usize,
+        visit: impl FnMut(Compared<'_>),
+    ) {
+        if let Some(copies) = self.channels.get(usize::from(channel)) {
+            copies.compare(vector, from, visit);
+        }
     }
 
     /// Number of views of a channel.

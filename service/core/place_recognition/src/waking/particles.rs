@@ -332,7 +332,8 @@ impl Filter {
         let middle = *middle;
         self.particles.iter().filter_map(move |particle| {
             let off = particle.position().coords - middle;
-            let is_near = off.xy().norm() < tuning::NEAR_M && off.z.abs() < tuning::NEAR_Z_M;
+            let is_near =
+                off.xy().norm_squared() < tuning::NEAR_M.powi(2) && off.z.abs() < tuning::NEAR_Z_M;
             is_near.then_some((particle, f64::from(particle.weight)))
         })
     }
