@@ -43,7 +43,10 @@ pub struct LiveAgent {
     pub stamp_ns: i64,
     /// How it is localised.
     pub status: Status,
-    /// Position in the frame of its estimate \[m\]: `map` unless it is lost.
+    /// Frame of the pose: `map`; or `unplaced` while the agent is lost and nothing ties it to the
+    /// map.
+    pub frame: String,
+    /// Position in that frame \[m\].
     pub translation_m: [f64; 3],
     /// Orientation in that frame, unit quaternion `[x, y, z, w]`.
     pub rotation_xyzw: [f64; 4],
@@ -124,6 +127,7 @@ impl LiveAgent {
             seq: estimate.seq,
             stamp_ns: estimate.stamp_ns,
             status: estimate.status,
+            frame: estimate.frame.clone(),
             translation_m: estimate.translation_m,
             rotation_xyzw: estimate.rotation_xyzw,
             position_covariance_m2: [c[0], c[1], c[2], c[6], c[7], c[11]],

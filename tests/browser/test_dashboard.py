@@ -188,6 +188,9 @@ def test_an_agent_that_is_lost_is_told_by_word_and_shape(service: Server, open_p
     shapes = [page.page.locator(f"[data-agent={name}] path").get_attribute("d")
               for name in ("ada", "eve")]
     assert shapes[0] != shapes[1]
+    # Where she is in the map is not known, so she is not drawn anywhere.
+    eventually("ada's dart", lambda: page.page.evaluate("cogmap.agent('ada')") is not None)
+    assert page.page.evaluate("cogmap.agent('eve')") is None
     page.page.click("[data-agent=eve]")
     eventually("the badge", lambda: page.text(".agent-panel .badge") == "lost")
 

@@ -14,9 +14,11 @@ export interface LiveAgent {
   seq: Int64;
   stamp_ns: Int64;
   status: Status;
+  /** `map`; or `unplaced` while it is lost and nothing ties it to the map. */
+  frame: string;
   translation_m: Vec3;
   rotation_xyzw: Quat;
-  /** Upper triangle, row by row, along the axes of `map` [m²]. */
+  /** Upper triangle, row by row, along the axes of the frame [m²]. */
   position_covariance_m2: [number, number, number, number, number, number];
   rotation_sd_rad: Vec3;
   place: number | null;

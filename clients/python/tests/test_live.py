@@ -20,6 +20,7 @@ TICK = {
             "seq": 41,
             "stamp_ns": 1795264924668453163,
             "status": "localized",
+            "frame": "map",
             "translation_m": [1, 2, 3],
             "rotation_xyzw": [0, 0, 0, 1],
             "position_covariance_m2": [1, 0, 0, 2, 0, 3],
@@ -92,6 +93,7 @@ def test_ticks_are_read_as_they_come(server: Server, client: cogmap.Client) -> N
     assert isinstance(first, cogmap.LiveTick) and isinstance(second, cogmap.LiveTick)
     assert lagged == cogmap.LaggedTicks(4)
     (ada,) = first.agents
+    assert ada.frame == "map"
     assert (ada.name, ada.stamp_ns, ada.status) == (
         "ada",
         1795264924668453163,

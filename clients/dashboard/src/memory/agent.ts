@@ -44,13 +44,18 @@ export class Agent {
     this.track.part(s);
   }
 
+  /** Whether its pose is one in the map, and not where it has gone since it woke up somewhere. */
+  get isPlaced(): boolean {
+    return this.live.frame === "map";
+  }
+
   /** Standard deviation of the position along its worst axis, at most √trace [m]. */
   get positionSdM(): number {
     const c = this.live.position_covariance_m2;
     return Math.sqrt(Math.max(c[0], c[3], c[5], 0));
   }
 
-  /** Angle of the body's x axis in the x-y plane of `map`, against x [rad]. */
+  /** Angle of the body's x axis in the x-y plane of its frame, against x [rad]. */
   get headingRad(): number {
     const [x, y, z, w] = this.live.rotation_xyzw;
     return Math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z));

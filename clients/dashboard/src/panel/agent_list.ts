@@ -85,5 +85,6 @@ export class AgentList {
     row.note.className = `note ${status}`;
     say(row.sd, `±${deviation(agent.positionSdM)}`);
     row.sd.title = "Standard deviation of the position along the worst axis";
+    row.element.title = agent.isPlaced ? "" : "Not in the map yet: it is not drawn";
   }
 }

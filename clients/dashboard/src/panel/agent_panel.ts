@@ -84,13 +84,17 @@ export class AgentPanel {
     this.refine.setAttribute("aria-pressed", String(agent.refined !== null));
     this.refine.disabled = isRefining;
     const facts = this.facts;
-    facts.set("position", `${position(live.translation_m)} m`, "x, y, z in map");
+    facts.set(
+      "position",
+      `${position(live.translation_m)} m`,
+      agent.isPlaced ? "x, y, z in map" : "x, y, z in a frame of its own: it is not in the map yet",
+    );
     facts.set(
       "sure to",
       `±${deviation(agent.positionSdM)}  ±${degrees(Math.max(...live.rotation_sd_rad))}`,
       "Standard deviation along and about the worst axis; the ellipsoid shows two of them",
     );
-    facts.set("heading", degrees(agent.headingRad), "In the x-y plane, against x");
+    facts.set("heading", degrees(agent.headingRad), "In the x-y plane of the same frame, against x");
     facts.set(
       "place",
       live.place === null ? "none" : `${live.place} · ${percent(live.confidence)}`,

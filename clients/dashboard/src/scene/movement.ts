@@ -48,10 +48,13 @@ export class Movement {
   }
 }
 
-/** Where an agent is to be shown; nowhere before its first pose. */
+/** Where an agent is to be shown; nowhere before its first pose, and where the map has none. */
 function goalOf(agent: Agent, time: number | null): TrackPose | null {
   if (time !== null) {
     return agent.track.before(time);
+  }
+  if (!agent.isPlaced) {
+    return null;
   }
   return { position: agent.live.translation_m, rotation: agent.live.rotation_xyzw };
 }

@@ -201,8 +201,8 @@ export class Stage {
       bounds.include(...memory.cloud.bounds.min);
       bounds.include(...memory.cloud.bounds.max);
     }
-    for (const { live } of memory?.agents.values() ?? []) {
-      if (live.status !== "lost") {
+    for (const { live, isPlaced } of memory?.agents.values() ?? []) {
+      if (isPlaced && live.status !== "lost") {
         bounds.include(...live.translation_m);
       }
     }

@@ -22,13 +22,16 @@ class LiveAgent:
     #: Stamp of that sample [ns].
     stamp_ns: int
     status: Status
-    #: Position in `map` [m].
+    #: Frame of the pose: `map`; or `unplaced` while the agent is lost and nothing ties it to the
+    #: map.
+    frame: str
+    #: Position in that frame [m].
     translation_m: Vec3
-    #: Orientation in `map`, unit quaternion `[x, y, z, w]`.
+    #: Orientation in that frame, unit quaternion `[x, y, z, w]`.
     rotation_xyzw: Quaternion
-    #: Upper triangle, row by row, of the covariance of the position along the axes of `map` [m^2].
+    #: Upper triangle, row by row, of the covariance of the position along its axes [m^2].
     position_covariance_m2: Tuple[float, float, float, float, float, float]
-    #: Standard deviation of the orientation about the axes of `map` [rad].
+    #: Standard deviation of the orientation about them [rad].
     rotation_sd_rad: Vec3
     #: The place cell that answers strongest, if any does.
     place: Optional[int]

@@ -117,6 +117,7 @@ async fn the_first_tick_has_all_agents_and_later_ones_those_that_changed() {
         "seq",
         "stamp_ns",
         "status",
+        "frame",
         "translation_m",
         "rotation_xyzw",
         "place",

@@ -300,6 +300,11 @@ impl Cell {
 }
 
 /// The key of the cell with a point.
+#[expect(
+    clippy::inline_always,
+    reason = "compiled for the vectors of a dispatch"
+)]
+#[inline(always)]
 pub(super) fn key_of(at: &Point3<f64>) -> Key {
     #[expect(clippy::cast_possible_truncation, reason = "bounded before")]
     let number = |x: f64| (x / tuning::SIDE_M).round().clamp(-1e9, 1e9) as i32;

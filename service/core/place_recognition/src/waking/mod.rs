@@ -5,6 +5,7 @@ mod claims;
 mod index;
 mod logistic;
 mod model;
+mod particle;
 mod particles;
 
 use geometry::PoseCovariance;

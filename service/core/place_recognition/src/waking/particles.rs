@@ -3,35 +3,18 @@
 use std::f64::consts::TAU;
 
 use geometry::PoseCovariance;
-use nalgebra::{Isometry3, Matrix4, Matrix6x4, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix4, Matrix6x4, UnitQuaternion, Vector3, Vector4};
 use random::Seeded;
 use state::{Counted, state_of_struct};
 
-use super::cells::{Cells, beside, key_of};
+use super::cells::{Cells, beside};
+use super::index::Key;
 use super::model::Scores;
+use super::particle::{Particle, draw, keys, normalise};
 use crate::keyframes::SampleKey;
 use crate::particle_numbers::{floats, pair};
 use crate::tuning::particles as tuning;
 use crate::view::{SensedTurn, View};
-
-/// Where the agent may be.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Particle {
-    /// Position in the map \[m\].
-    at: [f32; 3],
-    /// Turn of the frame of odometry in the map \[rad\].
-    turn_rad: f32,
-    /// Factor of odometry's lengths.
-    scale: f32,
-    weight: f32,
-}
-
-state_of_struct!(Particle {
-    at,
-    turn_rad,
-    scale,
-    weight
-});
 
 /// The filter of an agent in a session.
 #[derive(Clone, Debug)]
@@ -159,8 +142,8 @@ impl Filter {
             let mut old = 0.0;
             // Those that were drawn from one before are mostly in one cell still.
             let mut last = None;
-            for particle in &mut self.particles {
-                let key = key_of(&particle.position());
+            let keys = keys(&self.particles);
+            for (particle, key) in self.particles.iter_mut().zip(keys) {
                 let known = last.filter(|(known, _)| *known == key);
                 let (_, gain) = *last.insert(known.unwrap_or_else(|| {
                     let number = cells.find(self.channel, key);
@@ -277,9 +260,9 @@ impl Filter {
     /// Where most particles are; `None` without any.
     pub(super) fn mode(&self, cells: &Cells) -> Option<Mode> {
         // Those that were drawn from one before are mostly in one cell still.
-        let mut by_key: Vec<([i32; 3], f64)> = Vec::new();
-        for particle in &self.particles {
-            let (key, weight) = (key_of(&particle.position()), f64::from(particle.weight));
+        let mut by_key: Vec<(Key, f64)> = Vec::new();
+        for (particle, key) in self.particles.iter().zip(keys(&self.particles)) {
+            let weight = f64::from(particle.weight);
             match by_key.last_mut() {
                 Some(last) if last.0 == key => last.1 += weight,
                 _ => by_key.push((key, weight)),
@@ -293,7 +276,7 @@ impl Filter {
             }
             is_same
         });
-        let weight_of = |key: [i32; 3]| {
+        let weight_of = |key: Key| {
             let at = by_key.binary_search_by_key(&key, |(key, _)| *key);
             at.map_or(0.0, |at| by_key[at].1)
         };
@@ -314,46 +297,60 @@ impl Filter {
             height_m,
         );
         for _ in 0..3 {
-            let (sum, weight) = self.near(&middle).fold(
-                (Vector3::zeros(), 0.0),
-                |(sum, whole), (particle, weight)| {
-                    (sum + particle.position().coords * weight, whole + weight)
-                },
-            );
-            if weight <= 0.0 {
-                return None;
-            }
-            middle = sum / weight;
+            middle = self.mean_near(&middle)?;
         }
-        Some(self.gaussian(&middle))
+        self.gaussian(&middle)
     }
 
-    fn near(&self, middle: &Vector3<f64>) -> impl Iterator<Item = (&Particle, f64)> {
-        let middle = *middle;
-        self.particles.iter().filter_map(move |particle| {
-            let off = particle.position().coords - middle;
-            let is_near =
-                off.xy().norm_squared() < tuning::NEAR_M.powi(2) && off.z.abs() < tuning::NEAR_Z_M;
-            is_near.then_some((particle, f64::from(particle.weight)))
-        })
+    /// Mean position of the particles near a point; `None` without any.
+    fn mean_near(&self, middle: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let middle = <[f64; 3]>::from(*middle);
+        let (mut sum, mut whole) = ([0.0; 3], 0.0);
+        simd::dispatch(
+            #[inline(always)]
+            || {
+                for particle in &self.particles {
+                    let weight = particle.weight_near(&middle);
+                    for (sum, at) in sum.iter_mut().zip(particle.at) {
+                        *sum += f64::from(at) * weight;
+                    }
+                    whole += weight;
+                }
+            },
+        );
+        (whole > 0.0).then(|| Vector3::from(sum) / whole)
     }
 
-    /// The particles about a point as a Gaussian about a pose.
-    fn gaussian(&self, middle: &Vector3<f64>) -> Mode {
+    /// The particles about a point as a Gaussian about a pose; `None` without any.
+    fn gaussian(&self, middle: &Vector3<f64>) -> Option<Mode> {
+        let at = <[f64; 3]>::from(*middle);
         let (mut sin, mut cos, mut whole) = (0.0, 0.0, 0.0);
-        for (particle, weight) in self.near(middle) {
-            let (s, c) = f64::from(particle.turn_rad).sin_cos();
-            (sin, cos, whole) = (sin + s * weight, cos + c * weight, whole + weight);
+        for particle in &self.particles {
+            let weight = particle.weight_near(&at);
+            if weight > 0.0 {
+                let (s, c) = f64::from(particle.turn_rad).sin_cos();
+                (sin, cos, whole) = (sin + s * weight, cos + c * weight, whole + weight);
+            }
+        }
+        if whole <= 0.0 {
+            return None;
         }
         let turn_rad = sin.atan2(cos);
         // Of positions and turns in the map.
         let mut squares = Matrix4::zeros();
-        for (particle, weight) in self.near(middle) {
-            let off = particle.position().coords - middle;
-            let turned = (f64::from(particle.turn_rad) - turn_rad + TAU / 2.0).rem_euclid(TAU);
-            let error = off.push(turned - TAU / 2.0);
-            squares += error * error.transpose() * (weight / whole);
-        }
+        simd::dispatch(
+            #[inline(always)]
+            || {
+                for particle in &self.particles {
+                    let weight = particle.weight_near(&at) / whole;
+                    let [x, y, z] = particle.at.map(f64::from);
+                    let turned = (f64::from(particle.turn_rad) - turn_rad) / TAU;
+                    let turned = (turned - turned.round()) * TAU;
+                    let error = Vector4::new(x - at[0], y - at[1], z - at[2], turned);
+                    squares += error * error.transpose() * weight;
+                }
+            },
+        );
         let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, turn_rad);
         let rotation = turn * self.in_odom.rotation;
         let to_body = rotation.inverse().to_rotation_matrix().into_inner();
@@ -368,11 +365,11 @@ impl Filter {
             .iter()
             .map(|each| f64::from(each.weight))
             .sum();
-        Mode {
+        Some(Mode {
             pose: Isometry3::from_parts((*middle).into(), rotation),
             covariance: PoseCovariance::from_upper_part(&covariance),
             probability: whole / all * (1.0 - self.without),
-        }
+        })
     }
 
     /// Whether these log odds, and those of the views before, are enough for a claim.
@@ -405,65 +402,5 @@ impl Filter {
     }
 }
 
-impl Particle {
-    fn position(&self) -> Point3<f64> {
-        Point3::from(self.at.map(f64::from))
-    }
-}
-
-/// Draws particles by the scores of a view. Their weights make up for a tempering that is not the
-/// filter's.
-fn draw(
-    count: usize,
-    (temper, turn): (f64, Option<SensedTurn>),
-    scores: &Scores,
-    cells: &Cells,
-    draws: &mut Seeded,
-) -> Vec<Particle> {
-    let mut sum = 0.0;
-    let sums: Vec<f64> = { scores.cells.iter() }
-        .map(|(_, score)| {
-            sum += (temper * f64::from(*score)).exp();
-            sum
-        })
-        .collect();
-    let side_m = crate::tuning::cells::SIDE_M;
-    let drawn = (0..count).filter_map(|_| {
-        let at = draws.uniform() * sum;
-        let index = sums
-            .partition_point(|sum| *sum < at)
-            .min(sums.len().checked_sub(1)?);
-        let (number, score) = scores.cells[index];
-        let middle = cells.get(number)?.middle();
-        let [x, y] = [middle.x, middle.y].map(|x| x + (draws.uniform() - 0.5) * side_m);
-        let [scale, off] = pair(draws);
-        let turn_rad = match turn {
-            Some(turn) if draws.uniform() >= tuning::MISLED => turn.rad + turn.sd_rad * off,
-            _ => draws.uniform() * TAU,
-        };
-        let [x, y, z, turn_rad, scale, weight] = floats([
-            x,
-            y,
-            middle.z,
-            turn_rad,
-            1.0 + tuning::SCALE_SD * scale,
-            ((tuning::TEMPER - temper) * f64::from(score)).exp(),
-        ]);
-        Some(Particle {
-            at: [x, y, z],
-            turn_rad,
-            scale,
-            weight,
-        })
-    });
-    drawn.collect()
-}
-
-fn normalise(particles: &mut [Particle]) {
-    let whole: f64 = particles.iter().map(|each| f64::from(each.weight)).sum();
-    for particle in particles {
-        #[expect(clippy::cast_possible_truncation, reason = "a share")]
-        let share = (f64::from(particle.weight) / whole) as f32;
-        particle.weight = share;
-    }
-}
+#[cfg(test)]
+mod tests;
