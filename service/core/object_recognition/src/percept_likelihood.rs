@@ -208,9 +208,10 @@ impl PerceptLikelihood<'_> {
                 noise,
                 scale,
             } => {
+                let out = &mut out[..];
                 simd::dispatch(
                     #[inline(always)]
-                    || {
+                    move || {
                         for ((likelihood, level), variance) in
                             out.iter_mut().zip(levels).zip(variances)
                         {
@@ -226,9 +227,10 @@ impl PerceptLikelihood<'_> {
             }
         }
         if let Some(normal_percept) = &self.normal_percept {
+            let out = &mut out[..];
             simd::dispatch(
                 #[inline(always)]
-                || {
+                move || {
                     for (likelihood, normal) in out.iter_mut().zip(normals) {
                         *likelihood *= normal_percept.likelihood(normal);
                     }

@@ -447,8 +447,9 @@ pub(crate) mod waking {
     /// Most agents by which claims are tried at a time.
     pub(crate) const SHADOWS_MAX: usize = 8;
     /// Views of a channel after which an agent shows that anew, and after which one that does not
-    /// go on makes room for another one. Budget: a quarter of its views cost so much.
-    pub(crate) const SHADOW_WAITS: u32 = 96;
+    /// go on makes room for another one: at first, and once many claims were tried. Budget: trying
+    /// them is half of what a view of an agent costs that knows where it is.
+    pub(crate) const SHADOW_WAITS: [u32; 2] = [32, 96];
     /// Rate at which an agent's means of what is alike follow.
     pub(crate) const ALIKE_LATELY: f64 = 0.2;
     /// Views after which an agent is no longer followed.

@@ -137,7 +137,7 @@ impl Shortlist {
         let gate = to_f32(GATE_SQUARED);
         simd::dispatch(
             #[inline(always)]
-            || {
+            move || {
                 for (block, first) in blocks.iter().zip((0_u32..).step_by(LANES)) {
                     let [x, y, z] = &block.axes;
                     let (mut squares, mut variances) = ([0.0; LANES], [0.0; LANES]);

@@ -1,4 +1,5 @@
-//! Coarse copies of the views of a channel: they rule out most of those that are not alike.
+//! Coarse copies of the views of a channel: they rule out most of those that are not alike, and
+//! say about how alike others are.
 //!
 //! A copy is in numbers of eight bits, v ≈ s c, beside the length δ of what that leaves out. For a
 //! query q with its own copy q̂ and rest δ',
@@ -81,6 +82,13 @@ impl CoarseCopies {
         let last = self.blocks.len() - 1;
         if let Some(block) = self.blocks.get_mut(last, revision) {
             let coarse = Coarse::of(vector);
+            // All at once, and again after it was copied.
+            let room = VIEWS.saturating_sub(block.numbers.len());
+            block.numbers.reserve_exact(room);
+            block.codes.reserve_exact(room * vector.len());
+            for parts in [&mut block.scales, &mut block.lengths, &mut block.rests] {
+                parts.reserve_exact(room);
+            }
             block.numbers.push(number);
             block.codes.extend(coarse.codes);
             block.scales.push(coarse.scale);
@@ -99,29 +107,60 @@ impl CoarseCopies {
         numbers.map(|number| *number as usize)
     }
 
-    /// Compares the copies of the views from a number on with a vector; `visit` takes them in
-    /// order, block by block.
-    pub(super) fn compare(&self, vector: &[f32], from: usize, mut visit: impl FnMut(Compared<'_>)) {
-        let query = Coarse::of(vector);
-        let wide: Vec<i16> = query.codes.iter().map(|code| i16::from(*code)).collect();
-        let (mut cosines, mut most) = ([0.0; VIEWS], [0.0; VIEWS]);
-        for block in self.blocks.iter() {
-            let is_before = |number: &u32| (*number as usize) < from;
-            let first = block.numbers.partition_point(is_before);
-            let end = block.numbers.len();
-            if first == end {
-                continue;
-            }
+    /// Angles of every so many views with a vector \[rad\], from one on, by their copies; each with
+    /// the number of the view.
+    pub(super) fn angles_rad(
+        &self,
+        vector: &[f32],
+        first: usize,
+        step: usize,
+    ) -> impl Iterator<Item = (usize, f64)> {
+        let query = Query::of(vector);
+        let every = (first..self.len).step_by(step.max(1));
+        every.filter_map(move |at| {
+            let block = self.blocks.get(at / VIEWS)?;
+            let cosine = f64::from(query.cosine(block, at % VIEWS)?);
+            let number = *block.numbers.get(at % VIEWS)? as usize;
+            Some((number, cosine.clamp(-1.0, 1.0).acos()))
+        })
+    }
+
+    /// The numbers of the views from a number on that may have at least a cosine with a vector, in
+    /// order.
+    pub(super) fn alike(&self, vector: &[f32], cosine: f32, from: usize) -> Vec<usize> {
+        let query = Query::of(vector);
+        let mut bounds = [0.0; VIEWS];
+        let mut alike = Vec::new();
+        for block in self.blocks.iter_from(self.block_of(from)) {
             simd::dispatch(
                 #[inline(always)]
-                || block.compare(&query, &wide, &mut cosines, &mut most),
+                || query.bound(block, &mut bounds),
             );
-            visit(Compared {
-                numbers: &block.numbers[first..],
-                cosines: &cosines[first..end],
-                most: &most[first..end],
-            });
+            for (number, bound) in block.numbers.iter().zip(&bounds) {
+                // Of what is no number nothing is ruled out.
+                let is_less = *bound < cosine - ROUNDING;
+                let number = *number as usize;
+                if !is_less && number >= from {
+                    alike.push(number);
+                }
+            }
         }
+        alike
+    }
+
+    /// The first block with a view of a number or of a later one.
+    fn block_of(&self, number: usize) -> usize {
+        let (mut before, mut after) = (0, self.blocks.len());
+        while before < after {
+            let middle = before.midpoint(after);
+            let last = { self.blocks.get(middle) }.and_then(|block| block.numbers.last());
+            if last.is_some_and(|last| (*last as usize) < number) {
+                before = middle + 1;
+            } else {
+                after = middle;
+            }
+        }
+        before
     }
 
     /// Bytes of memory that they take.
@@ -134,37 +173,61 @@ impl CoarseCopies {
     }
 }
 
-impl Block {
-    /// The cosines of the copies with that of a vector, and the largest that the views themselves
-    /// may have.
+/// A vector that is compared with copies.
+struct Query {
+    own: Coarse,
+    /// Its numbers, as they are multiplied.
+    wide: Vec<i16>,
+}
+
+impl Query {
+    fn of(vector: &[f32]) -> Self {
+        let own = Coarse::of(vector);
+        let wide = own.codes.iter().map(|code| i16::from(*code)).collect();
+        Self { own, wide }
+    }
+
+    /// The cosine with the copy of one view of a block.
+    fn cosine(&self, block: &Block, index: usize) -> Option<f32> {
+        let codes = block
+            .codes
+            .chunks_exact(self.wide.len().max(1))
+            .nth(index)?;
+        Some(self.scaled(*block.scales.get(index)?, product(&self.wide, codes)))
+    }
+
+    /// What a product of coarse numbers stands for.
     #[expect(
         clippy::inline_always,
         reason = "compiled for the vectors of a dispatch"
     )]
     #[inline(always)]
-    fn compare(
-        &self,
-        query: &Coarse,
-        wide: &[i16],
-        cosines: &mut [f32; VIEWS],
-        most: &mut [f32; VIEWS],
-    ) {
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "off by less than rounding errors"
+    )]
+    fn scaled(&self, scale: f32, product: i32) -> f32 {
+        self.own.scale * scale * product as f32
+    }
+
+    /// The largest cosine that each view of a block may have with the vector.
+    #[expect(
+        clippy::inline_always,
+        reason = "compiled for the vectors of a dispatch"
+    )]
+    #[inline(always)]
+    fn bound(&self, block: &Block, bounds: &mut [f32; VIEWS]) {
         let mut products = [0; VIEWS];
-        let codes = self.codes.chunks_exact(wide.len().max(1));
+        let codes = block.codes.chunks_exact(self.wide.len().max(1));
         for (sum, codes) in products.iter_mut().zip(codes) {
-            *sum = product(wide, codes);
+            *sum = product(&self.wide, codes);
         }
-        let beyond = query.length + query.rest;
-        let parts = self.scales.iter().zip(&self.lengths).zip(&self.rests);
-        let out = cosines.iter_mut().zip(most.iter_mut()).zip(&products);
-        for (((cosine, most), product), ((scale, length), rest)) in out.zip(parts) {
-            #[expect(
-                clippy::cast_precision_loss,
-                reason = "off by less than rounding errors"
-            )]
-            let product = *product as f32;
-            *cosine = query.scale * scale * product;
-            *most = *cosine + (query.rest * length + beyond * rest);
+        let beyond = self.own.length + self.own.rest;
+        let parts = block.scales.iter().zip(&block.lengths).zip(&block.rests);
+        for ((bound, product), ((scale, length), rest)) in
+            bounds.iter_mut().zip(&products).zip(parts)
+        {
+            *bound = self.scaled(*scale, *product) + (self.own.rest * length + beyond * rest);
         }
     }
 }
@@ -191,34 +254,6 @@ fn product(a: &[i16], b: &[i8]) -> i32 {
         sum = sum.wrapping_add(i32::from(*a).wrapping_mul(i32::from(*b)));
     }
     sum
-}
-
-/// The next views of a channel beside a vector, by their coarse copies.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Compared<'a> {
-    pub(super) numbers: &'a [u32],
-    /// Cosines of the copies.
-    cosines: &'a [f32],
-    /// The largest that the views themselves may have.
-    most: &'a [f32],
-}
-
-impl Compared<'_> {
-    /// Angle between the copies of one of the views and of the vector \[rad\].
-    pub(super) fn angle_rad(&self, index: usize) -> f64 {
-        f64::from(self.cosines[index]).clamp(-1.0, 1.0).acos()
-    }
-
-    /// Numbers of the views that may have at least a cosine.
-    pub(super) fn alike(&self, cosine: f32) -> impl Iterator<Item = usize> {
-        let views = self.numbers.iter().zip(self.most);
-        let alike = views.filter(move |(_, most)| {
-            // Of what is no number nothing is ruled out.
-            let is_less = **most < cosine - ROUNDING;
-            !is_less
-        });
-        alike.map(|(number, _)| *number as usize)
-    }
 }
 
 #[cfg(test)]

@@ -2,7 +2,6 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::coarse_copies::Compared;
 use super::sequence_match::SequenceMatch;
 use super::track::ViewTrack;
 use super::view_index::ViewIndex;
@@ -126,13 +125,13 @@ impl ViewMemory {
     /// The similar earlier views, by number, with their distances; and whether one of them makes
     /// the view redundant.
     ///
-    /// A few of a channel are all compared. Of many, the coarse copies rule out most, by what was
-    /// known before the view; what unrelated views are like is learned from the copies of some,
-    /// spread evenly, others with each view, and each for as many as are not.
+    /// A few of a channel are all compared. What unrelated views are like is learned from the
+    /// coarse copies of some of many, spread evenly, others with each view, and each for as many as
+    /// are not. Of the rest only those are looked at that may be similar.
     fn similar_earlier(&mut self, view: &StoredView) -> (Vec<(usize, Distance)>, bool) {
         let model = &mut self.channels[usize::from(view.channel)];
         let earliest = view.ordinal.saturating_sub(tuning::EARLIER);
-        let is_recent = |number: &usize| self.index.is_since(*number, &view.sample, earliest);
+        let is_recent = |number: &usize| self.index.is_recent(*number, &view.sample, earliest);
         let mut similar = Vec::new();
         let mut is_known = false;
         let mut note = |model: &ChannelModel, number: usize, other: &StoredView, angle_rad: f64| {
@@ -152,28 +151,22 @@ impl ViewMemory {
                     continue;
                 };
                 let angle_rad = angle_rad(&other.vector, &view.vector);
-                model.learn_unrelated(angle_rad, &Pairs::ONE);
+                model.learn_unrelated(angle_rad, Pairs::ONE);
                 note(model, number, other, angle_rad);
             }
-        } else {
+        } else if let Some(copies) = self.index.copies(view.channel) {
             let stride = count.div_ceil(tuning::DRAWN);
             let pairs = Pairs::new(stride);
-            let cosine = model.similar_cosine();
-            let mut next = view.ordinal as usize % stride;
-            let mut alike = Vec::new();
-            let visit = |compared: Compared<'_>| {
-                while let Some(number) = compared.numbers.get(next) {
-                    if !is_recent(&(*number as usize)) {
-                        model.learn_unrelated(compared.angle_rad(next), &pairs);
-                    }
-                    next += stride;
+            let first = view.ordinal as usize % stride;
+            for (number, angle_rad) in copies.angles_rad(&view.vector, first, stride) {
+                if !is_recent(&number) {
+                    model.learn_unrelated(angle_rad, pairs);
                 }
-                next -= compared.numbers.len();
-                alike.extend(cosine.into_iter().flat_map(|cosine| compared.alike(cosine)));
-            };
-            let channel = view.channel;
-            self.index.compare(channel, &view.vector, 0, visit);
-            for number in alike.into_iter().filter(|number| !is_recent(number)) {
+            }
+            let cosine = model.similar_cosine();
+            let alike = cosine.map(|cosine| copies.alike(&view.vector, cosine, 0));
+            let alike = alike.into_iter().flatten();
+            for number in alike.filter(|number| !is_recent(number)) {
                 if let Some(other) = self.stored.get(number) {
                     let angle_rad = angle_rad(&other.vector, &view.vector);
                     note(model, number, other, angle_rad);
@@ -383,12 +376,10 @@ impl ViewMemory {
     ) -> Vec<SimilarView> {
         let model = self.channels.get(usize::from(channel));
         let cosine = model.and_then(ChannelModel::similar_cosine);
-        let mut alike = Vec::new();
-        if let Some(cosine) = cosine {
-            let visit = |compared: Compared<'_>| alike.extend(compared.alike(cosine));
-            self.index.compare(channel, vector, from, visit);
-        }
-        let mut similar: Vec<SimilarView> = { alike.into_iter() }
+        let copies = self.index.copies(channel);
+        let alike =
+            { copies.zip(cosine) }.map(|(copies, cosine)| copies.alike(vector, cosine, from));
+        let mut similar: Vec<SimilarView> = { alike.into_iter().flatten() }
             .filter_map(|number| self.stored.get(number))
             .filter(|view| !is_left_out(view))
             .filter_map(|view| {

@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 use nalgebra::Point3;
 use state::PagedVec;
 
-use super::coarse_copies::{CoarseCopies, Compared};
+use super::coarse_copies::CoarseCopies;
 use crate::keyframes::SampleKey;
 use crate::views::StoredView;
 
@@ -70,34 +70,25 @@ impl ViewIndex {
         }
     }
 
-    /// Compares the views of a channel from a number on with a vector; `visit` takes them in order.
-    pub(super) fn compare(
-        &self,
-        channel: u8,
-        vector: &[f32],
-        from: usize,
-        visit: impl FnMut(Compared<'_>),
-    ) {
-        if let Some(copies) = self.channels.get(usize::from(channel)) {
-            copies.compare(vector, from, visit);
-        }
+    /// The coarse copies of the views of a channel, if it has any.
+    pub(super) fn copies(&self, channel: u8) -> Option<&CoarseCopies> {
+        self.channels.get(usize::from(channel))
     }
 
     /// Number of views of a channel.
     pub(super) fn count(&self, channel: u8) -> usize {
-        let copies = self.channels.get(usize::from(channel));
-        copies.map_or(0, CoarseCopies::len)
+        self.copies(channel).map_or(0, CoarseCopies::len)
     }
 
     /// The numbers of the views of a channel, in order.
     pub(super) fn of_channel(&self, channel: u8) -> impl Iterator<Item = usize> {
-        let copies = self.channels.get(usize::from(channel)).into_iter();
+        let copies = self.copies(channel).into_iter();
         copies.flat_map(CoarseCopies::numbers)
     }
 
     /// Whether a view was taken by the agent of a sample, in its session, and is of an ordinal or a
     /// later one.
-    pub(super) fn is_since(&self, number: usize, sample: &SampleKey, ordinal: u32) -> bool {
+    pub(super) fn is_recent(&self, number: usize, sample: &SampleKey, ordinal: u32) -> bool {
         let block = self.blocks.get(number / VIEWS);
         let source = block.and_then(|block| block.sources.get(number % VIEWS));
         source.is_some_and(|source| {

@@ -18,6 +18,8 @@ pub(crate) const FOLLOWED: f64 = 0.0;
 pub(crate) const KEPT: f64 = 0.98;
 /// Fewest claims that say how often they are right.
 pub(crate) const COUNT_MIN: f64 = 10.0;
+/// First claims, the older ones faded, after which they are tried less often.
+pub(crate) const COUNT_MANY: f64 = 25.0;
 /// Largest share of wrong ones at which claims are made at all.
 pub(crate) const WRONG_MAX: f64 = 0.2;
 /// Squared error of a claim in its variances: at first, and the largest that counts.

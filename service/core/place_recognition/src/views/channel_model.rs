@@ -105,7 +105,7 @@ impl ChannelModel {
 
     /// Learns from two views that are far from one another along the way, which stand for some
     /// pairs: they count as if each of these had the angle.
-    pub(crate) fn learn_unrelated(&mut self, angle_rad: f64, pairs: &Pairs) {
+    pub(crate) fn learn_unrelated(&mut self, angle_rad: f64, pairs: Pairs) {
         let unrelated = &mut self.unrelated;
         let is_known = unrelated.count() >= tuning::UNRELATED_MIN;
         if is_known && angle_rad < unrelated.mean() - tuning::RELATED * unrelated.sd() {
@@ -288,7 +288,7 @@ mod tests {
         for step in 0..4000_u32 {
             let distance_m = f64::from(step % 100) * 0.015;
             model.learn(0, distance_m, distance_m);
-            model.learn_unrelated(1.5 + 0.1 * (f64::from(step) * 0.7).sin(), &Pairs::ONE);
+            model.learn_unrelated(1.5 + 0.1 * (f64::from(step) * 0.7).sin(), Pairs::ONE);
         }
         model
     }
@@ -298,9 +298,9 @@ mod tests {
         let (mut many, mut one) = (learned(), learned());
         let angle_rad = 1.42;
         for _ in 0..50 {
-            many.learn_unrelated(angle_rad, &Pairs::new(7));
+            many.learn_unrelated(angle_rad, Pairs::new(7));
             for _ in 0..7 {
-                one.learn_unrelated(angle_rad, &Pairs::ONE);
+                one.learn_unrelated(angle_rad, Pairs::ONE);
             }
         }
         assert!((many.unrelated.mean() - one.unrelated.mean()).abs() < 1e-9);

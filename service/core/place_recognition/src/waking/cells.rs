@@ -221,7 +221,7 @@ impl Cells {
             },
         );
         for ([product, density], cell) in products.iter_mut().zip(self.all.iter()) {
-            if cell.channel == channel && !cell.sum.is_empty() {
+            if cell.channel == channel && cell.sum.len() == vector.len() {
                 let cosine = *product / cell.length.max(f32::MIN_POSITIVE);
                 *density = cell.weight * (tuning::SHARPNESS * (cosine - 1.0)).exp();
             }
@@ -242,9 +242,9 @@ impl Cells {
     }
 
     /// Whether a channel has so many cells.
-    pub(super) fn are_as_many(&self, channel: u8, count: usize) -> bool {
-        let mut own = self.all.iter().filter(|cell| cell.channel == channel);
-        own.by_ref().take(count).count() == count
+    pub(super) fn has_at_least(&self, channel: u8, count: usize) -> bool {
+        let own = self.all.iter().filter(|cell| cell.channel == channel);
+        own.take(count).count() == count
     }
 
     /// Whether cells are of channels, with as many numbers as a channel has, each once.

@@ -77,6 +77,11 @@ impl Claims {
         }
     }
 
+    /// Whether so many first claims were tried that one more says little.
+    pub(super) fn are_many(&self) -> bool {
+        self.right + self.wrong >= tuning::COUNT_MANY
+    }
+
     /// Whether enough first claims were right: no more are wrong than the largest share and chance
     /// explain, by one standard deviation of a binomial count. An agent that taught and had drifted
     /// itself counts as a wrong claim, too.

@@ -176,8 +176,10 @@ impl Waking {
     fn shadow_of(&mut self, sample: SampleKey, channel: u8, revision: u64) -> Option<usize> {
         let waited = |filter: &Filter| {
             let known = self.channels.get(usize::from(filter.channel));
-            let since = known.map_or(0, |known| known.n_seen.wrapping_sub(filter.seen_at));
-            since > tuning::SHADOW_WAITS
+            known.is_some_and(|known| {
+                let waits = tuning::SHADOW_WAITS[usize::from(known.claims.are_many())];
+                known.n_seen.wrapping_sub(filter.seen_at) > waits
+            })
         };
         let is_over = |filter: &Filter| filter.n_views >= tuning::SHADOW_VIEWS;
         let new = Filter::new(sample, channel, true);
@@ -255,7 +257,7 @@ impl Waking {
         };
         self.channels[usize::from(channel)].model.is_telling()
             && self.is_best(channel)
-            && self.cells.are_as_many(channel, tuning::CELLS_LARGE)
+            && self.cells.has_at_least(channel, tuning::CELLS_LARGE)
     }
 
     /// Whether an agent was found and is still followed.

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use geometry::PoseCovariance;
-use nalgebra::{Isometry3, Matrix4, Matrix6x4, UnitQuaternion, Vector3, Vector4};
+use nalgebra::{Isometry3, Matrix4, Matrix6x4, UnitQuaternion, Vector3};
 use random::Seeded;
 use state::{Counted, state_of_struct};
 
@@ -305,10 +305,10 @@ impl Filter {
     /// Mean position of the particles near a point; `None` without any.
     fn mean_near(&self, middle: &Vector3<f64>) -> Option<Vector3<f64>> {
         let middle = <[f64; 3]>::from(*middle);
-        let (mut sum, mut whole) = ([0.0; 3], 0.0);
-        simd::dispatch(
+        let (sum, whole) = simd::dispatch(
             #[inline(always)]
             || {
+                let (mut sum, mut whole) = ([0.0; 3], 0.0);
                 for particle in &self.particles {
                     let weight = particle.weight_near(&middle);
                     for (sum, at) in sum.iter_mut().zip(particle.at) {
@@ -316,6 +316,7 @@ impl Filter {
                     }
                     whole += weight;
                 }
+                (sum, whole)
             },
         );
         (whole > 0.0).then(|| Vector3::from(sum) / whole)
@@ -337,20 +338,28 @@ impl Filter {
         }
         let turn_rad = sin.atan2(cos);
         // Of positions and turns in the map.
-        let mut squares = Matrix4::zeros();
-        simd::dispatch(
+        let squares = simd::dispatch(
             #[inline(always)]
             || {
+                let mut squares = [[0.0; 4]; 4];
                 for particle in &self.particles {
                     let weight = particle.weight_near(&at) / whole;
-                    let [x, y, z] = particle.at.map(f64::from);
                     let turned = (f64::from(particle.turn_rad) - turn_rad) / TAU;
-                    let turned = (turned - turned.round()) * TAU;
-                    let error = Vector4::new(x - at[0], y - at[1], z - at[2], turned);
-                    squares += error * error.transpose() * weight;
+                    let mut error = [0.0; 4];
+                    for axis in 0..3 {
+                        error[axis] = f64::from(particle.at[axis]) - at[axis];
+                    }
+                    error[3] = (turned - turned.round()) * TAU;
+                    for (column, one) in squares.iter_mut().zip(&error) {
+                        for (square, other) in column.iter_mut().zip(&error) {
+                            *square += one * weight * other;
+                        }
+                    }
                 }
+                squares
             },
         );
+        let squares = Matrix4::from(squares);
         let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, turn_rad);
         let rotation = turn * self.in_odom.rotation;
         let to_body = rotation.inverse().to_rotation_matrix().into_inner();

@@ -33,15 +33,6 @@ fn copies(vectors: &[Vec<f32>]) -> CoarseCopies {
     copies
 }
 
-/// The numbers of the views from one on that may have at least a cosine with a vector.
-fn alike(copies: &CoarseCopies, vector: &[f32], from: usize, cosine: f32) -> Vec<usize> {
-    let mut found = Vec::new();
-    copies.compare(vector, from, |compared| {
-        found.extend(compared.alike(cosine));
-    });
-    found
-}
-
 #[test]
 fn no_view_that_is_alike_is_ruled_out_and_most_others_are() {
     let vectors = vectors(500, &mut Seeded(7));
@@ -49,7 +40,7 @@ fn no_view_that_is_alike_is_ruled_out_and_most_others_are() {
     for (cosine_min, from) in [(0.3, 0), (0.8, 300), (0.95, 961), (-1.0, 192), (1.0, 0)] {
         let (mut alike, mut found) = (0, 0);
         for query in vectors.iter().step_by(9) {
-            let numbers = self::alike(&copies, query, from, cosine_min);
+            let numbers = copies.alike(query, cosine_min, from);
             let all = (0..).step_by(3).zip(&vectors);
             let expected: Vec<usize> = all
                 .filter(|(number, other)| {
@@ -70,17 +61,16 @@ fn no_view_that_is_alike_is_ruled_out_and_most_others_are() {
 fn copies_have_about_the_angles_of_their_views() {
     let vectors = vectors(300, &mut Seeded(10));
     let copies = copies(&vectors);
-    let mut numbers = Vec::new();
-    copies.compare(&vectors[100], 90, |compared| {
-        for (index, number) in compared.numbers.iter().enumerate() {
-            let expected = cosine(&vectors[*number as usize / 3], &vectors[100]);
-            let off = compared.angle_rad(index).cos() - expected;
+    for (first, step) in [(0, 1), (64, 1), (4, 7), (200, 90), (300, 1)] {
+        let mut numbers = Vec::new();
+        for (number, angle_rad) in copies.angles_rad(&vectors[100], first, step) {
+            let off = angle_rad.cos() - cosine(&vectors[number / 3], &vectors[100]);
             assert!(off.abs() < 0.01, "{off}");
-            numbers.push(*number);
+            numbers.push(number);
         }
-    });
-    let expected: Vec<u32> = (90..900).step_by(3).collect();
-    assert_eq!(numbers, expected);
+        let expected: Vec<usize> = (3 * first..900).step_by(3 * step).collect();
+        assert_eq!(numbers, expected);
+    }
 }
 
 #[test]
@@ -88,7 +78,7 @@ fn a_vector_of_zeros_is_like_none_and_breaks_nothing() {
     let mut vectors = vectors(3, &mut Seeded(8));
     vectors[0] = vec![0.0; NUMBERS];
     let copies = copies(&vectors);
-    assert_eq!(alike(&copies, &[0.0; NUMBERS], 0, 0.5), []);
-    assert_eq!(alike(&copies, &vectors[1], 0, 0.99), [3]);
-    assert_eq!(alike(&copies, &[], 0, 0.5), []);
+    assert_eq!(copies.alike(&[0.0; NUMBERS], 0.5, 0), []);
+    assert_eq!(copies.alike(&vectors[1], 0.99, 0), [3]);
+    assert_eq!(copies.alike(&[], 0.5, 0), []);
 }

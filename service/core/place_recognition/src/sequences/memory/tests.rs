@@ -130,3 +130,34 @@ fn few_views_of_a_channel_are_all_compared_beside_many_of_another() {
     assert!(memory.channels[1].reach_m().is_some());
     assert!(memory.channels[0].reach_m().is_none());
 }
+
+/// What unrelated views are like is learned from every so many of them, others with each view, as
+/// if these were compared themselves.
+#[test]
+fn what_unrelated_views_are_like_is_learned_from_some_of_many() {
+    let mut draws = Seeded(5);
+    let mut memory = memory(0, &mut draws);
+    let count = 2600_usize;
+    for ordinal in 0..2600 {
+        memory.remember(stored(0, ordinal, &mut draws), 1);
+    }
+    let stride = count.div_ceil(tuning::DRAWN);
+    let mut expected = memory.channels[0].clone();
+    for ordinal in [2600_u32, 2601, 2610] {
+        let view = stored(0, ordinal, &mut draws);
+        let first = ordinal as usize % stride;
+        for number in (first..count).step_by(stride) {
+            if number + (tuning::EARLIER as usize) < ordinal as usize {
+                let other = memory.stored.get(number).unwrap();
+                let angle_rad = angle_rad(&other.vector, &view.vector);
+                expected.learn_unrelated(angle_rad, Pairs::new(stride));
+            }
+        }
+        memory.similar_earlier(&view);
+        let learned = &memory.channels[0];
+        let off = learned.news_rad() - expected.news_rad();
+        assert!(off.abs() < 1e-3, "{ordinal}: {off}");
+        let cosines = [learned, &expected].map(|model| model.similar_cosine().unwrap());
+        assert!((cosines[0] - cosines[1]).abs() < 3e-3, "{cosines:?}");
+    }
+}

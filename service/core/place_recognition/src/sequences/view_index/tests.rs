@@ -49,14 +49,9 @@ fn views_of_a_channel_are_numbered_among_all() {
     let expected: Vec<usize> = (0..300).filter(|number| number % 3 == 2).collect();
     assert_eq!(index.of_channel(1).collect::<Vec<_>>(), expected);
     assert_eq!([0, 1, 2].map(|channel| index.count(channel)), [200, 100, 0]);
-    let mut numbers = Vec::new();
-    index.compare(1, &views[101].vector, 100, |compared| {
-        numbers.extend(compared.numbers.iter().map(|number| *number as usize));
-    });
-    assert_eq!(numbers, expected[33..]);
-    index.compare(2, &views[0].vector, 0, |_| {
-        panic!("no view is of this channel")
-    });
+    let copies = index.copies(1).expect("views of the channel");
+    assert_eq!(copies.alike(&views[101].vector, -1.0, 100), expected[33..]);
+    assert!(index.copies(2).is_none());
 }
 
 #[test]
@@ -64,10 +59,12 @@ fn who_saw_a_view_and_when_is_known_of_each() {
     let mut draws = Seeded(11);
     let mut views = views(200, &mut draws);
     views[150].sample.session = 2;
+    views[160].sample.agent = 1;
     let index = ViewIndex::of(views.iter(), 1);
-    let since = |number| index.is_since(number, &views[0].sample, 120);
-    let found: Vec<usize> = (0..201).filter(|number| since(*number)).collect();
-    let expected: Vec<usize> = (120..200).filter(|number| *number != 150).collect();
+    let is_recent = |number: &usize| index.is_recent(*number, &views[0].sample, 120);
+    let found: Vec<usize> = (0..201).filter(is_recent).collect();
+    let is_own = |number: &usize| ![150, 160].contains(number);
+    let expected: Vec<usize> = (120..200).filter(is_own).collect();
     assert_eq!(found, expected);
 }
 
