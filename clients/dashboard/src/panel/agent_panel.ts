@@ -94,7 +94,11 @@ export class AgentPanel {
       `±${deviation(agent.positionSdM)}  ±${degrees(Math.max(...live.rotation_sd_rad))}`,
       "Standard deviation along and about the worst axis; the ellipsoid shows two of them",
     );
-    facts.set("heading", degrees(agent.headingRad), "In the x-y plane of the same frame, against x");
+    facts.set(
+      "heading",
+      degrees(agent.headingRad),
+      "In the x-y plane of the same frame, against x",
+    );
     facts.set(
       "place",
       live.place === null ? "none" : `${live.place} · ${percent(live.confidence)}`,
