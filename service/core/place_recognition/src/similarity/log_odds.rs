@@ -14,6 +14,9 @@ pub(super) struct Learned {
     /// Distance at which the similarity of views has fallen halfway to that of far ones, as the
     /// deviation of a Gaussian \[m\].
     pub(super) range_m: f64,
+    /// Whether it was seen to fall so far: or else the range is that of the farthest neighbours,
+    /// and may be more.
+    pub(super) is_range_seen: bool,
     /// Distance of views one after the other \[m\].
     pub(super) spacing_m: f64,
     /// What a turn of the body changes in how alike views are.
@@ -30,9 +33,11 @@ pub(super) struct Learned {
 
 impl Learned {
     /// Whether views are alike over more than so many metres, and over many views of a way: farther
-    /// apart than they are alike, views would show the same range.
+    /// apart than they are alike, views would show the same range. Or over as much of a way as was
+    /// compared: as long as few views were seen, some mixture of their numbers changes slowly along
+    /// any way.
     pub(super) fn is_coarse(&self, least_m: f64) -> bool {
-        self.range_m > least_m.max(tuning::COARSE_SPACINGS * self.spacing_m)
+        !self.is_range_seen || self.range_m > least_m.max(tuning::COARSE_SPACINGS * self.spacing_m)
     }
 
     /// From the scores of all pairs of views and of neighbours; `None` if there are no far views,
@@ -47,13 +52,18 @@ impl Learned {
             return None;
         }
         let base = mean(&far, &scores);
-        let (range_m, spacing_m) = range_m(neighbours, base)?;
+        let LearnedRange {
+            range_m,
+            is_seen,
+            spacing_m,
+        } = range(neighbours, base)?;
         let backgrounds = backgrounds(runs, &scores);
         let near = near_features(neighbours, range_m, &backgrounds);
         let distant = far_features(&far, &scores, &backgrounds);
         let weights = logistic(&near, &distant)?;
         let mut learned = Self {
             range_m,
+            is_range_seen: is_seen,
             spacing_m,
             turned: Turned::of(neighbours, range_m, base),
             independence: 1.0,
@@ -179,9 +189,18 @@ fn mean(pairs: &[(usize, usize)], scores: &DMatrix<f32>) -> f64 {
     sum / pairs.len() as f64
 }
 
-/// The range of a channel, from its views' neighbours along the way, and the distance of the
-/// nearest of them; `base` is the mean score of far views.
-fn range_m(neighbours: &[NeighbourPair], base: f64) -> Option<(f64, f64)> {
+/// What neighbours along the way say of the range of a channel.
+struct LearnedRange {
+    range_m: f64,
+    /// Whether similarity falls halfway among them.
+    is_seen: bool,
+    /// Distance of the nearest of them \[m\].
+    spacing_m: f64,
+}
+
+/// The range of a channel, from its views' neighbours along the way; `base` is the mean score of
+/// far views.
+fn range(neighbours: &[NeighbourPair], base: f64) -> Option<LearnedRange> {
     let mut pairs: Vec<(f64, f64)> = { neighbours.iter() }
         .map(|pair| (pair.distance_m, pair.score))
         .collect();
@@ -206,7 +225,11 @@ fn range_m(neighbours: &[NeighbourPair], base: f64) -> Option<(f64, f64)> {
         Some(class) => class.0 / tuning::HALF_HEIGHT,
         None => classes[classes.len() - 1].0,
     };
-    (range_m > 0.0).then_some((range_m, classes[0].0))
+    (range_m > 0.0).then_some(LearnedRange {
+        range_m,
+        is_seen: falls.is_some(),
+        spacing_m: classes[0].0,
+    })
 }
 
 /// How alike the most similar far views of each view are: log of their mean odds.

@@ -199,3 +199,47 @@ fn sequences_of_all_views_are_those_of_views_between_which_there_are_none() {
     let apart = (of_all - of_thinned).abs().max();
     assert!(apart < 1e-3, "{apart}");
 }
+
+/// The log of a robot that goes straight on, a view each 0.4 m: of a field of so many numbers that
+/// changes over 1.5 m.
+fn log_of_field(n_views: u32, numbers: u32) -> ViewLog {
+    let mut draws = random::Seeded(u64::from(numbers));
+    let waves: Vec<(f64, f64)> = (0..numbers)
+        .map(|_| (draws.normal(), std::f64::consts::TAU * draws.uniform()))
+        .collect();
+    let mut log = ViewLog::default();
+    for ordinal in 0..n_views {
+        let at_m = 0.4 * f64::from(ordinal);
+        let vector = waves.iter().map(|(wave, shift)| {
+            let seen = (wave * at_m / 1.5 + shift).cos() + 0.1 * draws.normal();
+            #[expect(clippy::cast_possible_truncation, reason = "a view is no exact number")]
+            let seen = seen as f32;
+            seen
+        });
+        let view = LoggedView {
+            channel: 0,
+            sample: SampleKey {
+                agent: 0,
+                session: 0,
+                seq: u64::from(ordinal),
+            },
+            ordinal,
+            stretch: 0,
+            in_odom: Isometry3::translation(at_m, 0.0, 0.0),
+            vector: vector.collect(),
+        };
+        log.add(view, 1);
+    }
+    log
+}
+
+/// Of few views, some mixture of their many numbers changes slowly along any way: they seem alike
+/// over all of it that was compared, and hold no map. More views show how far they are alike.
+#[test]
+fn views_that_seem_alike_over_all_of_a_way_hold_no_map() {
+    let few = log_of_field(112, 128);
+    let many = log_of_field(900, 128);
+    let [few, many] = [&few, &many].map(|log| *Similarity::of_channels(log, 1024)[0].learned());
+    assert!(few.is_coarse && few.range_m > 5.0, "{few:?}");
+    assert!(!many.is_coarse && many.range_m < 4.0, "{many:?}");
+}
