@@ -8,8 +8,8 @@
 //! q·v ≤ q̂·(s c) + δ' |v| + (|q| + δ') δ
 //! ```
 //!
-//! so a view below a cosine by that is below it; the others are compared as they are. Answers are
-//! therefore those of a comparison with all.
+//! so a view below a cosine by that is below it; the others are compared as they are. Which views
+//! are alike is therefore answered as by a comparison with all. Angles by the copies are not exact.
 
 use state::PagedVec;
 

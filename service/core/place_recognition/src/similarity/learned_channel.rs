@@ -16,8 +16,8 @@ pub struct LearnedChannel {
     pub range_m: f64,
     /// What a turn of the body between two views changes.
     pub turned: Turned,
-    /// Whether that is so far that a pair of views says less than odometry does. Agents are still
-    /// found among the cells by such views.
+    /// Whether that is so far that a pair of views says less than odometry does, or as far as views
+    /// were compared. Agents are still found among the cells by such views.
     pub is_coarse: bool,
     /// Mean log of the likelihood ratio of two neighbours along the way to be within the range of
     /// one another, against far ones: what a pair of views says \[nats\]. Of the later half of the
@@ -38,12 +38,14 @@ state_of_struct!(LearnedChannel {
 });
 
 impl LearnedChannel {
-    /// The same after what was known of the channel before: one that was coarse is so until its
-    /// range is clearly shorter.
+    /// The same after what was known of the channel before: one that was coarse by its range is so
+    /// until that is clearly shorter.
     #[must_use]
     pub fn after(mut self, before: &[Self]) -> Self {
-        let was_coarse = { before.iter() }.any(|one| one.channel == self.channel && one.is_coarse);
-        self.is_coarse |= was_coarse && self.range_m > COARSE_M.1;
+        let is_long = |one: &Self| one.range_m > COARSE_M.1;
+        let was_coarse = { before.iter() }
+            .any(|one| one.channel == self.channel && one.is_coarse && is_long(one));
+        self.is_coarse |= was_coarse && is_long(&self);
         self
     }
 

@@ -6,9 +6,7 @@ use random::Seeded;
 use super::*;
 use crate::keyframes::SampleKey;
 
-const NUMBERS: usize = 24;
-
-/// Unit vectors, some of them near one another, on two channels.
+/// Views along a way, on two channels.
 fn views(count: u32, draws: &mut Seeded) -> Vec<StoredView> {
     let view = |ordinal: u32| {
         let at = Point3::new(f64::from(ordinal) * 0.1, draws.uniform(), 0.0);
@@ -23,22 +21,10 @@ fn views(count: u32, draws: &mut Seeded) -> Vec<StoredView> {
             in_odom: Isometry3::identity(),
             in_map: at,
             spread: [0.0; 2],
-            vector: vector(f64::from(ordinal) * 0.02, draws),
+            vector: vec![1.0, 0.0].into(),
         }
     };
     (0..count).map(view).collect()
-}
-
-fn vector(phase: f64, draws: &mut Seeded) -> Box<[f32]> {
-    let numbers = (0..NUMBERS).map(|k| {
-        let wave = (phase * (1.0 + k as f64) + k as f64 * 2.4).sin();
-        wave + 0.5 * (draws.uniform() - 0.5)
-    });
-    let numbers: Vec<f64> = numbers.collect();
-    let length = numbers.iter().map(|x| x * x).sum::<f64>().sqrt();
-    #[expect(clippy::cast_possible_truncation, reason = "a view")]
-    let short = |x: &f64| (x / length) as f32;
-    numbers.iter().map(short).collect()
 }
 
 #[test]

@@ -28,10 +28,10 @@ fn seen(at_m: f64) -> Box<[f32]> {
     (0..NUMBERS).map(number).collect()
 }
 
-/// The log of a robot that was at points of a corridor \[m\]; the last of them are new.
-fn log_of(way: &[f64], n_new: u32) -> ViewLog {
+/// The log of a robot that was at points of a corridor \[m\] and saw these views there.
+fn log_along(views: impl Iterator<Item = (f64, Box<[f32]>)>) -> ViewLog {
     let mut log = ViewLog::default();
-    for (ordinal, at) in (0..).zip(way) {
+    for (ordinal, (at_m, vector)) in (0..).zip(views) {
         let view = LoggedView {
             channel: 0,
             sample: SampleKey {
@@ -41,11 +41,17 @@ fn log_of(way: &[f64], n_new: u32) -> ViewLog {
             },
             ordinal,
             stretch: 0,
-            in_odom: Isometry3::translation(*at, 0.0, 0.0),
-            vector: seen(*at),
+            in_odom: Isometry3::translation(at_m, 0.0, 0.0),
+            vector,
         };
         log.add(view, 1);
     }
+    log
+}
+
+/// The log of a robot that was at points of a corridor \[m\]; the last of them are new.
+fn log_of(way: &[f64], n_new: u32) -> ViewLog {
+    let mut log = log_along(way.iter().map(|at| (*at, seen(*at))));
     log.n_new = n_new;
     log
 }
@@ -207,8 +213,7 @@ fn log_of_field(n_views: u32, numbers: u32) -> ViewLog {
     let waves: Vec<(f64, f64)> = (0..numbers)
         .map(|_| (draws.normal(), std::f64::consts::TAU * draws.uniform()))
         .collect();
-    let mut log = ViewLog::default();
-    for ordinal in 0..n_views {
+    let view = |ordinal| {
         let at_m = 0.4 * f64::from(ordinal);
         let vector = waves.iter().map(|(wave, shift)| {
             let seen = (wave * at_m / 1.5 + shift).cos() + 0.1 * draws.normal();
@@ -216,21 +221,9 @@ fn log_of_field(n_views: u32, numbers: u32) -> ViewLog {
             let seen = seen as f32;
             seen
         });
-        let view = LoggedView {
-            channel: 0,
-            sample: SampleKey {
-                agent: 0,
-                session: 0,
-                seq: u64::from(ordinal),
-            },
-            ordinal,
-            stretch: 0,
-            in_odom: Isometry3::translation(at_m, 0.0, 0.0),
-            vector: vector.collect(),
-        };
-        log.add(view, 1);
-    }
-    log
+        (at_m, vector.collect())
+    };
+    log_along((0..n_views).map(view))
 }
 
 /// Of few views, some mixture of their many numbers changes slowly along any way: they seem alike
@@ -242,4 +235,21 @@ fn views_that_seem_alike_over_all_of_a_way_hold_no_map() {
     let [few, many] = [&few, &many].map(|log| *Similarity::of_channels(log, 1024)[0].learned());
     assert!(few.is_coarse && few.range_m > 5.0, "{few:?}");
     assert!(!many.is_coarse && many.range_m < 4.0, "{many:?}");
+}
+
+/// A channel with a long range holds no map until that is clearly shorter; one whose range was not
+/// seen holds it from when it is.
+#[test]
+fn a_channel_that_was_coarse_by_its_range_stays_so_for_a_while() {
+    let known = *Similarity::of_channels(&log_of_field(112, 128), 1024)[0].learned();
+    let of = |range_m: f64, is_coarse: bool| LearnedChannel {
+        range_m,
+        is_coarse,
+        ..known
+    };
+    let between = of(14.0, false);
+    assert!(between.after(&[of(20.0, true)]).is_coarse);
+    assert!(!between.after(&[of(8.0, true)]).is_coarse);
+    assert!(!between.after(&[of(14.0, false)]).is_coarse);
+    assert!(!of(8.0, false).after(&[of(20.0, true)]).is_coarse);
 }
