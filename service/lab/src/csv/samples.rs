@@ -26,6 +26,8 @@ const HEADING_SD_RAD: f64 = 0.2;
 pub struct Choice {
     /// Channels that are left out.
     pub without: BTreeSet<String>,
+    /// Motions go without the noise that the set states, so that the space's odometry noise holds.
+    pub unstated_noise: bool,
 }
 
 impl TableSet {
@@ -53,8 +55,8 @@ impl TableSet {
             let stamp_ns = Self::sent_ns(row.stamp_ns);
             match &row.body {
                 RowBody::Increment(motion, sd) => {
-                    let noise = motion_noise(&at_least(sd));
-                    let number = stream.increment(stamp_ns, motion, Some(noise));
+                    let noise = (!choice.unstated_noise).then(|| motion_noise(&at_least(sd)));
+                    let number = stream.increment(stamp_ns, motion, noise);
                     motions.push((stamp_ns, number));
                 }
                 RowBody::Velocity(velocity, duration_s) => {

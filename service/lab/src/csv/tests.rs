@@ -1,7 +1,9 @@
 //! Tables as the format says, and what is sent of them.
 
-use cogmap_proto::{NameError, Relation, SampleBody, Target};
+use cogmap_proto::{Increment, NameError, Relation, SampleBody, Target};
 use nalgebra::Vector3;
+
+use crate::stream::Stream;
 
 use super::{Choice, Row, RowBody, TableError, TableReason, TableSet, Views};
 
@@ -75,7 +77,11 @@ fn an_agent_sends_its_rows_a_second_later() {
 #[test]
 fn a_channel_is_left_out_by_name() {
     let without = ["eye".to_owned(), "light".to_owned()].into();
-    let stream = set().stream("a", None, &Choice { without }).unwrap();
+    let choice = Choice {
+        without,
+        ..Choice::default()
+    };
+    let stream = set().stream("a", None, &choice).unwrap();
     let is_percept = |body: &SampleBody| {
         matches!(
             body,
@@ -89,6 +95,33 @@ fn a_channel_is_left_out_by_name() {
             .any(|sample| is_percept(&sample.body))
     );
     assert_eq!(stream.samples().len(), 4);
+}
+
+#[test]
+fn motions_go_without_noise_where_none_is_to_be_stated() {
+    let choice = Choice {
+        unstated_noise: true,
+        ..Choice::default()
+    };
+    let [stated, unstated] =
+        [Choice::default(), choice].map(|choice| set().stream("a", None, &choice).unwrap());
+    let motions = |stream: &Stream| -> Vec<Increment> {
+        let bodies = stream.samples().iter().map(|sample| &sample.body);
+        bodies
+            .filter_map(|body| match body {
+                SampleBody::Increment(motion) => Some(motion.clone()),
+                _ => None,
+            })
+            .collect()
+    };
+    let (stated, unstated) = (motions(&stated), motions(&unstated));
+    assert!(!stated.is_empty());
+    for (one, other) in stated.iter().zip(&unstated) {
+        assert!(one.noise.is_some() && other.noise.is_none());
+        assert_eq!(one.translation_m, other.translation_m);
+        assert_eq!(one.rotation_xyzw, other.rotation_xyzw);
+    }
+    assert_eq!(stated.len(), unstated.len());
 }
 
 #[test]

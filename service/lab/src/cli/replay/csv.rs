@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use cogmap::cli::output;
-use cogmap_lab::csv::TableSet;
+use cogmap_lab::csv::{Choice, TableSet};
 use serde::Serialize;
 
 use super::arguments::{ReplayArgs, share};
@@ -35,6 +35,10 @@ pub(in crate::cli) struct CsvArgs {
     /// Leave out these channels.
     #[arg(long, value_name = "CHANNEL,CHANNEL", value_delimiter = ',')]
     no: Vec<String>,
+    /// Send motions without the noise that the set states, as a robot that knows nothing of its
+    /// odometry.
+    #[arg(long)]
+    unstated_noise: bool,
     /// Most agents.
     #[arg(long, value_name = "N")]
     max_agents: Option<usize>,
@@ -107,7 +111,10 @@ impl CsvArgs {
     fn selection(&self) -> Selection {
         Selection {
             only: self.only.clone(),
-            without: self.no.iter().cloned().collect(),
+            choice: Choice {
+                without: self.no.iter().cloned().collect(),
+                unstated_noise: self.unstated_noise,
+            },
             max_agents: self.max_agents,
             shuffle: self.shuffle,
             sharing: match (self.one_space, self.together) {

@@ -1,6 +1,6 @@
 //! What a set of recordings measures, by its kind.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use cogmap_client::Api;
 use cogmap_lab::csv::{Choice, Log, RowBody, TableSet, Truth};
@@ -28,8 +28,8 @@ const RIGHT_WITHIN_STEPS: f64 = 3.0;
 /// How sets are measured, whatever they hold.
 #[derive(Clone, Debug)]
 pub(super) struct Measuring {
-    /// Channels that are left out.
-    pub(super) without: BTreeSet<String>,
+    /// What of them is sent.
+    pub(super) choice: Choice,
     /// Seed of the order of sessions.
     pub(super) seed: u64,
     /// The agent whose route is remembered, in sets that have it; elsewhere the first by name.
@@ -72,7 +72,7 @@ impl Measuring {
     /// The truth of no agent is known, or a view is not there.
     pub(super) fn replay(&self, set: &TableSet, kind: SetKind) -> anyhow::Result<Measured> {
         let mut selection = Selection {
-            without: self.without.clone(),
+            choice: self.choice.clone(),
             ..Selection::default()
         };
         if kind == SetKind::Sessions {
@@ -132,9 +132,7 @@ impl Measuring {
             taught: taught.clone(),
             length: QUESTION_VIEWS,
             within_m: RIGHT_WITHIN_STEPS * self.step_m(log, truth),
-            choice: Choice {
-                without: self.without.clone(),
-            },
+            choice: self.choice.clone(),
         };
         let settings = settings(&self.setting).map_err(anyhow::Error::msg)?;
         Ok(Measured {
@@ -147,7 +145,7 @@ impl Measuring {
     /// How far an agent went from one view to the next \[m\], in the median.
     fn step_m(&self, log: &Log, truth: &Truth) -> f64 {
         let seen_at = log.rows.iter().filter_map(|row| match &row.body {
-            RowBody::Descriptor(channel, _) if !self.without.contains(channel) => {
+            RowBody::Descriptor(channel, _) if !self.choice.without.contains(channel) => {
                 truth.at(row.stamp_ns)
             }
             _ => None,

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use cogmap::cli::output;
-use cogmap_lab::csv::TableSet;
+use cogmap_lab::csv::{Choice, TableSet};
 
 use super::measured::{Measured, Measuring};
 use super::real_report::RealReport;
@@ -26,6 +26,10 @@ pub(in crate::cli) struct RealArgs {
     /// Leave out these channels.
     #[arg(long, value_name = "CHANNEL,CHANNEL", value_delimiter = ',')]
     no: Vec<String>,
+    /// Send motions without the noise that the sets state, as a robot that knows nothing of its
+    /// odometry.
+    #[arg(long)]
+    unstated_noise: bool,
     /// Seed of the order of sessions, where a set has many.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -44,7 +48,10 @@ pub(in crate::cli) struct RealArgs {
 
 pub(super) fn run(args: &RealArgs) -> anyhow::Result<()> {
     let measuring = Measuring {
-        without: args.no.iter().cloned().collect(),
+        choice: Choice {
+            without: args.no.iter().cloned().collect(),
+            unstated_noise: args.unstated_noise,
+        },
         seed: args.seed,
         taught: args.taught.clone(),
         setting: args.setting.clone(),
@@ -82,7 +89,7 @@ fn measure(
     space: &str,
 ) -> anyhow::Result<Measured> {
     let set = TableSet::load(directory)?;
-    match SetKind::of(&set, &measuring.without) {
+    match SetKind::of(&set, &measuring.choice.without) {
         SetKind::Route => {
             let host = match host {
                 Some(host) => host,

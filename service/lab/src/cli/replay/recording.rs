@@ -35,8 +35,8 @@ pub(super) enum Sharing {
 pub(super) struct Selection {
     /// These agents; all when empty.
     pub(super) only: Vec<String>,
-    /// Channels that are left out.
-    pub(super) without: BTreeSet<String>,
+    /// What of theirs is sent.
+    pub(super) choice: Choice,
     /// Most agents.
     pub(super) max_agents: Option<usize>,
     /// Seed of a random order of the agents; they come in order of time when absent.
@@ -165,16 +165,14 @@ impl<'a> Recording<'a> {
 
     /// What the agents send, by their spaces.
     fn teams(&self, args: &ReplayArgs) -> anyhow::Result<Vec<Team>> {
-        let choice = Choice {
-            without: self.selection.without.clone(),
-        };
+        let choice = &self.selection.choice;
         let (batch, space) = (args.batch(), args.space("csv"));
         let mut sent: Vec<(&str, Stream, Trajectory)> = Vec::new();
         for (index, agent) in self.agents.iter().enumerate() {
             let first = agent.log.rows.first().map_or(0, |row| row.stamp_ns);
             let is_told = self.selection.taught.is_none_or(|taught| index < taught);
             let start = agent.truth.start(first).filter(|_| is_told);
-            let stream = self.set.stream(agent.name, start.as_ref(), &choice)?;
+            let stream = self.set.stream(agent.name, start.as_ref(), choice)?;
             let positions = agent.truth.trajectory.positions().iter();
             let positions = positions.map(|row| StampedPosition {
                 stamp_ns: TableSet::sent_ns(row.stamp_ns),
@@ -222,7 +220,7 @@ impl<'a> Recording<'a> {
     fn seen_at(&self, agent: &Agent<'_>) -> Vec<nalgebra::Vector3<f64>> {
         let rows = agent.log.rows.iter();
         let views = rows.filter(|row| match &row.body {
-            RowBody::Descriptor(channel, _) => !self.selection.without.contains(channel),
+            RowBody::Descriptor(channel, _) => !self.selection.choice.without.contains(channel),
             _ => false,
         });
         views
