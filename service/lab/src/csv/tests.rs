@@ -118,8 +118,11 @@ fn motions_go_without_noise_where_none_is_to_be_stated() {
     assert!(!stated.is_empty());
     for (one, other) in stated.iter().zip(&unstated) {
         assert!(one.noise.is_some() && other.noise.is_none());
-        assert_eq!(one.translation_m, other.translation_m);
-        assert_eq!(one.rotation_xyzw, other.rotation_xyzw);
+        let moved = |motion: &Increment| {
+            let numbers = [&motion.translation_m[..], &motion.rotation_xyzw[..]].concat();
+            numbers.into_iter().map(f64::to_bits).collect::<Vec<_>>()
+        };
+        assert_eq!(moved(one), moved(other));
     }
     assert_eq!(stated.len(), unstated.len());
 }
