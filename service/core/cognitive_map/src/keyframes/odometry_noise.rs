@@ -68,17 +68,21 @@ impl RelaxationCopy {
         let copy = self.of_middles(problem);
         let mut problem = Problem::new(copy.graph(), Among::Accepted, Calibrating::Free);
         problem.map.relax(&RelaxationSettings::default());
-        let chains = &self.graph().chains;
-        let chance = Chance::of(chains, &problem);
+        let chance = Chance::of(&self.graph().chains, &problem);
         let gain = |(_, closure): (u32, &Constraint)| {
             chance.log_gain(closure, self.graph().is_planar(closure), &problem)
         };
         let closures = copy.accepted().map(gain);
-        let noise = (0..)
-            .zip(chains.tracks.iter())
+        closures.sum::<f64>() - 0.5 * problem.map.chi_squared() + self.log_volume(&problem)
+    }
+
+    /// Log of how much of what was possible before is probable by a relaxed map, by Laplace's
+    /// approximation about it and up to a constant: −½ ln |H| − n ln s, as above.
+    pub(super) fn log_volume(&self, problem: &Problem) -> f64 {
+        let chains = &self.graph().chains;
+        let noise = { (0..).zip(chains.tracks.iter()) }
             .map(|(agent, track)| turns(chains, agent, track.is_planar) * track.turn_noise.ln());
-        let misfit = problem.map.chi_squared() + problem.map.marginals().log_determinant();
-        closures.sum::<f64>() - 0.5 * misfit - noise.sum::<f64>()
+        -0.5 * problem.map.marginals().log_determinant() - noise.sum::<f64>()
     }
 }
 

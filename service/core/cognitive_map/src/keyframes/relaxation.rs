@@ -71,14 +71,19 @@ impl RelaxationCopy {
         for number in accepted {
             undecided.set_state(number, ClosureState::Pending);
         }
+        undecided.set_turn_noise(turn_noise);
+        undecided
+    }
+
+    /// Supposes that the noise of rotations that nobody states is so many times what is assumed.
+    pub(super) fn set_turn_noise(&mut self, turn_noise: f64) {
         for agent in (0..).take(self.graph.chains.tracks.len()) {
-            if let Some(track) = undecided.graph.track_mut(agent)
+            if let Some(track) = self.graph.track_mut(agent)
                 && !track.states_noise
             {
                 track.turn_noise = turn_noise;
             }
         }
-        undecided
     }
 
     /// Whether there are loop closures that were stated and were not accepted yet.

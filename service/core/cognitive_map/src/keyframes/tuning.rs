@@ -190,6 +190,9 @@ pub(super) const CLOSURES_SUPPOSED_MIN: u64 = 16;
 /// that of modest wheels, and good ones have a twentieth of it.
 pub(super) const TURN_NOISES_TRIED: &[f64] = &[1.0, 0.25, 0.0625];
 
+/// Factors of it with which views are matched, where the noise is not stated.
+pub(super) const MATCHED_TURN_NOISES: &[f64] = &[1.0, 0.4];
+
 /// Factor that is one deviation off what is expected of that.
 pub(super) const TURN_NOISE_PRIOR_SD: f64 = 10.0;
 

@@ -23,6 +23,10 @@ struct Matched {
     copy: RelaxationCopy,
     /// Log of how probable the views and the odometry are by it, up to a constant.
     log_probability: f64,
+    /// What that becomes for all maps near it, up to a constant of the same keyframes.
+    log_evidence: f64,
+    /// How probable the best other map has to be.
+    log_probability_needed: f64,
 }
 
 impl RelaxationCopy {
@@ -37,6 +41,11 @@ impl RelaxationCopy {
     ///
     /// The best map may have its views matched once more, closely ([`Matching`]), as long as that
     /// loses less than half of what tells two maps apart.
+    ///
+    /// Where the noise of rotations is not stated, maps are matched with each that is tried, and the
+    /// noise is taken by which all maps near the best one are most probable together (the evidence
+    /// of the model: `MacKay` 1992): too much lets a map fold onto itself, too little keeps to
+    /// odometry's.
     ///
     /// Beyond the most keyframes of [`Matching`], maps are compared by some of them, evenly spaced.
     /// Those between move with the one before.
@@ -71,23 +80,17 @@ impl RelaxationCopy {
             }
         }
         let thinned = self.thinned(tuning::MATCHED_STEP * range_m, matching.keyframes_max);
-        let mut best = thinned.with_matches(Arc::default(), &[1.0], &channels);
-        let needed = best.log_probability + another_map;
-        if !before.is_empty() {
-            let as_before = thinned.with_matches(Arc::clone(&before), &[1.0], &channels);
-            if as_before.log_probability > best.log_probability {
-                best = as_before;
-            }
-        }
-        for start in thinned.starts(matching, &channels, range_m, 2.0 * another_map) {
-            let other = start.gated(&channels);
-            if other.log_probability > needed.max(best.log_probability) {
-                best = other;
-            }
-        }
+        let maps = thinned.noises().into_iter().map(|noise| {
+            let thinned = thinned.with_turn_noise(noise);
+            thinned.best_map(matching, &channels, &before, another_map)
+        });
+        let Some(mut best) = maps.reduce(Matched::more_evident) else {
+            return before != held;
+        };
         if before.is_empty() && best.copy.graph().matches.is_empty() {
             return before != held;
         }
+        let needed = best.log_probability_needed;
         let least = needed.max(best.log_probability - 0.5 * another_map);
         for _ in 0..matching.close_matchings {
             match best.matched_closely(&channels) {
@@ -99,6 +102,59 @@ impl RelaxationCopy {
         self.graph().matches != held
     }
 
+    /// The noises of rotations with which the map is matched, as factors of what is assumed: more
+    /// than one where an agent's noise is stated by nobody, and not learned from closures.
+    fn noises(&self) -> Vec<Option<f64>> {
+        let is_open = self
+            .graph()
+            .chains
+            .tracks
+            .iter()
+            .any(|one| !one.states_noise);
+        if is_open && self.accepted().next().is_none() {
+            let tried = tuning::MATCHED_TURN_NOISES.iter();
+            tried.copied().map(Some).collect()
+        } else {
+            vec![None]
+        }
+    }
+
+    /// A copy with another noise of the rotations whose noise is not stated.
+    fn with_turn_noise(&self, noise: Option<f64>) -> Self {
+        let mut copy = self.clone();
+        if let Some(noise) = noise {
+            copy.set_turn_noise(noise);
+        }
+        copy
+    }
+
+    /// The map by which views and odometry are most probable: that of odometry, that of the matches
+    /// before, or one that is found from a start and more probable by `another_map` nats.
+    fn best_map(
+        &self,
+        matching: &Matching,
+        channels: &[Similarity<'_>],
+        before: &ViewMatches,
+        another_map: f64,
+    ) -> Matched {
+        let mut best = self.with_matches(Arc::default(), &[1.0], channels);
+        let needed = best.log_probability + another_map;
+        if !before.is_empty() {
+            let as_before = self.with_matches(Arc::clone(before), &[1.0], channels);
+            if as_before.log_probability > best.log_probability {
+                best = as_before;
+            }
+        }
+        for start in self.starts(matching, channels, 2.0 * another_map) {
+            let other = start.gated(channels);
+            if other.log_probability > needed.max(best.log_probability) {
+                best = other;
+            }
+        }
+        best.log_probability_needed = needed;
+        best
+    }
+
     /// Copies relaxed by matches that were found wherever their keyframes are, from where they are
     /// now and where they would be by odometry with each veer: those that are different maps, and
     /// as probable as the best up to `margin_nats`.
@@ -106,15 +162,16 @@ impl RelaxationCopy {
         &self,
         matching: &Matching,
         channels: &[Similarity<'_>],
-        range_m: f64,
         margin_nats: f64,
     ) -> Vec<Matched> {
+        let ranges = channels.iter().map(|channel| channel.learned().range_m);
+        let step_m = tuning::MATCHED_STEP * ranges.fold(f64::INFINITY, f64::min);
         let all: ViewMatches = channels.iter().flat_map(Similarity::matches).collect();
         let by_odometry = { matching.veers.iter() }.map(|&veer| self.dead_reckoned(veer));
         let mut starts: Vec<Matched> = Vec::new();
         for start in std::iter::once(self.clone()).chain(by_odometry) {
             let start = start.with_matches(Arc::clone(&all), matching.widths, channels);
-            let is_same = |other: &Matched| other.is_within(&start, tuning::MATCHED_STEP * range_m);
+            let is_same = |other: &Matched| other.is_within(&start, step_m);
             if !starts.iter().any(is_same) {
                 starts.push(start);
             }
@@ -145,6 +202,7 @@ impl RelaxationCopy {
             });
         }
         copy.move_keyframes(&problem);
+        let log_volume = copy.log_volume(&problem);
         problem.switch_off_matches();
         let graph = copy.graph();
         let evidence: f64 = { channels.iter() }
@@ -154,6 +212,8 @@ impl RelaxationCopy {
         Matched {
             copy,
             log_probability,
+            log_evidence: log_probability + log_volume,
+            log_probability_needed: f64::NEG_INFINITY,
         }
     }
 
@@ -175,6 +235,15 @@ impl RelaxationCopy {
 }
 
 impl Matched {
+    /// The one of two maps of different noises that is more evident; the first if both are equally.
+    fn more_evident(self, other: Self) -> Self {
+        if other.log_evidence > self.log_evidence {
+            other
+        } else {
+            self
+        }
+    }
+
     /// The same, relaxed twice by matches that are near to one another by it.
     fn gated(self, channels: &[Similarity<'_>]) -> Self {
         let mut matched = self;
