@@ -60,7 +60,7 @@ pub(crate) async fn delete(
 ) -> Result<StatusCode, Problem> {
     let map = space.snapshot().await?;
     let known = map.blockages().iter().find(|known| known.id.0 == id);
-    let known = known.ok_or_else(|| unknown("blockage"))?;
+    let known = known.ok_or_else(|| unknown("blockage", &id))?;
     space.unblock(known.id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

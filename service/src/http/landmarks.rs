@@ -72,7 +72,7 @@ pub(crate) async fn get(
         .map(|(_, landmark)| encode::landmark(landmark));
     found
         .map(|landmark| reply::json(&landmark))
-        .ok_or_else(|| unknown("landmark"))
+        .ok_or_else(|| unknown("landmark", &label))
 }
 
 /// The space that the path names, and the label of a landmark that may be there or not.

@@ -10,7 +10,7 @@ use cogmap_proto::{
     AgentObject, Identification, IdentifyQuery, ObjectDetail, ObjectLesson, ObjectPage,
     ObjectSummary,
 };
-use cognitive_map::{CognitiveMap, InvalidSample, Label};
+use cognitive_map::{CognitiveMap, Label};
 use serde::Deserialize;
 
 use super::extract::{
@@ -99,10 +99,11 @@ pub(crate) async fn get(
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
-    name.ok()
-        .and_then(|name| detail(&map, &name))
+    let label = Label::new(&name).ok();
+    label
+        .and_then(|label| detail(&map, &label))
         .map(|object| reply::json(&object))
-        .ok_or_else(|| unknown("object"))
+        .ok_or_else(|| unknown("object", &name))
 }
 
 /// What the answer to a lesson tells beside the object.
@@ -130,16 +131,16 @@ pub(crate) async fn put(
     Query(query): Query<TeachQuery>,
     Json(lesson): Json<ObjectLesson>,
 ) -> Result<Response<Body>, Problem> {
-    let name = name.map_err(InvalidContacts::Name)?;
+    let label = Label::new(&name).map_err(InvalidContacts::Name)?;
     let valid = decode::lesson(&lesson)?;
-    space.teach(&name, lesson, valid).await?;
+    space.teach(&label, lesson, valid).await?;
     let map = space.snapshot().await?;
-    let mut taught = detail(&map, &name)
-        .ok_or_else(|| unknown("object"))?
+    let mut taught = detail(&map, &label)
+        .ok_or_else(|| unknown("object", &name))?
         .summary;
     // The lesson is on disk, whether or not there is room for the question.
     if query.alike
-        && let Ok((map, alike)) = space.alike(name).await
+        && let Ok((map, alike)) = space.alike(label).await
     {
         taught.alike = encode::object_alike(&map, alike);
     }
@@ -157,11 +158,11 @@ pub(crate) async fn delete(
     _: NoQuery,
 ) -> Result<StatusCode, Problem> {
     let map = space.snapshot().await?;
-    let name = name.map_err(|_| unknown("object"))?;
-    if map.object_by_name(&name).is_none() {
-        return Err(unknown("object"));
+    let label = Label::new(&name).map_err(|_| unknown("object", &name))?;
+    if map.object_by_name(&label).is_none() {
+        return Err(unknown("object", &name));
     }
-    space.forget_object(&name).await?;
+    space.forget_object(&label).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -217,14 +218,13 @@ fn detail(map: &CognitiveMap, name: &Label) -> Option<ObjectDetail> {
 
 /// The space that the path names, and the name of an object that may be there or not, or none that
 /// an object can have.
-pub(crate) struct ObjectOfPath(Arc<Space>, Result<Label, InvalidSample>);
+pub(crate) struct ObjectOfPath(Arc<Space>, String);
 
 impl FromRequestParts<Service> for ObjectOfPath {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, service: &Service) -> Result<Self, Problem> {
         let params: ObjectParams = path(parts, service).await?;
-        let name = Label::new(&params.name);
-        Ok(Self(space(parts, service, &params.space)?, name))
+        Ok(Self(space(parts, service, &params.space)?, params.name))
     }
 }

@@ -54,10 +54,11 @@ pub(crate) async fn delete(
 }
 
 fn trip(map: &CognitiveMap, id: u64) -> Result<TripId, Problem> {
-    let trip = u32::try_from(id).map(TripId).map_err(|_| unknown("trip"))?;
+    let trip = u32::try_from(id).map(TripId);
+    let trip = trip.map_err(|_| unknown("trip", &id))?;
     match map.trip(trip) {
         Some(_) => Ok(trip),
-        None if map.is_forgotten_trip(trip) => Err(forgotten("trip")),
-        None => Err(unknown("trip")),
+        None if map.is_forgotten_trip(trip) => Err(forgotten("trip", id)),
+        None => Err(unknown("trip", &id)),
     }
 }

@@ -120,13 +120,13 @@ pub(crate) async fn percepts(
 }
 
 fn known(map: &CognitiveMap, id: u64) -> Result<(PlaceId, &Place), Problem> {
-    let id = u32::try_from(id)
-        .map(PlaceId)
-        .map_err(|_| unknown("place"))?;
+    let number = id;
+    let id = u32::try_from(number).map(PlaceId);
+    let id = id.map_err(|_| unknown("place", &number))?;
     match map.place(id) {
         Some(place) => Ok((id, place)),
-        None if map.is_forgotten_place(id) => Err(forgotten("place")),
-        None => Err(unknown("place")),
+        None if map.is_forgotten_place(id) => Err(forgotten("place", number)),
+        None => Err(unknown("place", &number)),
     }
 }
 
@@ -146,13 +146,16 @@ impl FromRequestParts<Service> for MemoryOfPath {
 }
 
 /// There is no such memory.
-pub(crate) fn unknown(what: &str) -> Problem {
-    Problem::new(Kind::UnknownMemory, format!("the space has no such {what}"))
+pub(crate) fn unknown(what: &str, name: &impl std::fmt::Display) -> Problem {
+    Problem::new(
+        Kind::UnknownMemory,
+        format!("the space has no {what} {name}"),
+    )
 }
 
 /// There was such a memory.
-pub(crate) fn forgotten(what: &str) -> Problem {
-    let detail = format!("the space has forgotten this {what} to make room for others");
+pub(crate) fn forgotten(what: &str, number: u64) -> Problem {
+    let detail = format!("the space has forgotten {what} {number} to make room for others");
     Problem::new(Kind::ForgottenMemory, detail)
 }
 

@@ -92,10 +92,12 @@ pub(crate) async fn get(
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
-    let id = u32::try_from(id).map(TripId).map_err(|_| unknown("trip"))?;
+    let number = id;
+    let id = u32::try_from(number).map(TripId);
+    let id = id.map_err(|_| unknown("trip", &number))?;
     match map.trip(id) {
         Some(trip) => Ok(reply::json(&encode::trip_detail(&map, id, trip))),
-        None if map.is_forgotten_trip(id) => Err(forgotten("trip")),
-        None => Err(unknown("trip")),
+        None if map.is_forgotten_trip(id) => Err(forgotten("trip", number)),
+        None => Err(unknown("trip", &number)),
     }
 }

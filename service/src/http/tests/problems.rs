@@ -289,6 +289,26 @@ async fn a_refusal_says_what_is_there_and_what_is_wanted() {
 }
 
 #[tokio::test]
+async fn a_memory_that_is_not_there_is_called_by_its_name() {
+    let rig = rig();
+    for (path, unknown) in [
+        ("places/7", "the space has no place 7"),
+        ("trips/8", "the space has no trip 8"),
+        ("trips/8/pin", "the space has no trip 8"),
+        ("landmarks/post", "the space has no landmark post"),
+        ("objects/cup", "the space has no object cup"),
+    ] {
+        let request = match path {
+            "trips/8/pin" => Request::put(format!("/v1/spaces/lab/{path}")),
+            _ => Request::get(format!("/v1/spaces/lab/{path}")),
+        };
+        let request = request.body(Body::empty()).expect("a request");
+        let problem = rig.ask(request).await.problem(404, "unknown-memory");
+        assert_eq!(problem["detail"], unknown);
+    }
+}
+
+#[tokio::test]
 async fn bounds_of_the_engine_are_conflicts() {
     let engine = EngineSettings {
         agents_max: 1,
