@@ -46,6 +46,7 @@ mod landmarks;
 mod list;
 mod live_estimates;
 mod map;
+mod match_links;
 mod matching;
 mod meanwhile;
 mod moment;

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point3};
+use nalgebra::{Isometry3, Point3};
 use place_recognition::{SampleKey, Similarity, ViewLog, ViewMatch};
 
 use super::agent_track::AgentTrack;
@@ -15,8 +15,7 @@ use super::problem::{Among, Calibrating, Problem};
 use super::relaxation::RelaxationCopy;
 use super::tuning;
 use geometry::is_somewhere;
-use pose_graph::{Calibration, SightingTarget};
-use pose_graph::{Kernel, Link, LinkId, PositionInformation, RelaxationSettings, Scale};
+use pose_graph::{Calibration, RelaxationSettings};
 
 /// A copy of the graph, relaxed by matches of views.
 struct Matched {
@@ -42,28 +41,16 @@ impl RelaxationCopy {
     /// The best map may have its views matched once more, closely ([`Matching`]), as long as that
     /// loses less than half of what tells two maps apart.
     ///
-    /// Where the noise of rotations is not stated, maps are matched with each that is tried, and the
-    /// noise is taken by which all maps near the best one are most probable together (the evidence
-    /// of the model: `MacKay` 1992): too much lets a map fold onto itself, too little keeps to
-    /// odometry's.
+    /// Where the noise of rotations is not stated, maps are matched with each that is tried, and
+    /// the noise is taken by which all maps near the best one are most probable together (the
+    /// evidence of the model: `MacKay` 1992): too much lets a map fold onto itself, too little
+    /// keeps to odometry's.
     ///
     /// Beyond the most keyframes of [`Matching`], maps are compared by some of them, evenly spaced.
     /// Those between move with the one before.
     pub(super) fn match_views(&mut self, log: &ViewLog, matching: &Matching) -> bool {
-        let channels = Similarity::of_channels(log, matching.views_max);
-        let before = Arc::clone(&self.graph().learned);
-        let learned = |channel: &Similarity<'_>| channel.learned().after(&before);
-        self.set_learned(channels.iter().map(learned).collect());
-        let is_fine = |channel: &Similarity<'_>| !learned(channel).is_coarse;
-        let (channels, coarse): (Vec<_>, Vec<_>) = channels.into_iter().partition(is_fine);
-        // What has turned out to say so little no longer holds the map.
-        let coarse = coarse.iter().map(|channel| channel.learned().channel);
-        let coarse: BTreeSet<SampleKey> = coarse.flat_map(|one| log.samples_of(one)).collect();
         let held = Arc::clone(&self.graph().matches);
-        let is_of_fine = |matched: &&ViewMatch| !coarse.contains(&matched.now);
-        self.set_matches(held.iter().filter(is_of_fine).copied().collect());
-        let view_maps = channels.iter().map(|channel| channel.view_map().clone());
-        self.set_view_maps(view_maps.collect());
+        let channels = self.learned_channels(log, matching);
         let ranges = channels.iter().map(|channel| channel.learned().range_m);
         let before = Arc::clone(&self.graph().matches);
         let Some(range_m) = ranges.min_by(f64::total_cmp) else {
@@ -100,6 +87,29 @@ impl RelaxationCopy {
         }
         self.adopt_thinned(&best.copy);
         self.graph().matches != held
+    }
+
+    /// The channels of a log that say where a robot is, learned anew. What has turned out to say so
+    /// little no longer holds the map.
+    fn learned_channels<'a>(
+        &mut self,
+        log: &'a ViewLog,
+        matching: &Matching,
+    ) -> Vec<Similarity<'a>> {
+        let channels = Similarity::of_channels(log, matching.views_max);
+        let before = Arc::clone(&self.graph().learned);
+        let learned = |channel: &Similarity<'_>| channel.learned().after(&before);
+        self.set_learned(channels.iter().map(learned).collect());
+        let is_fine = |channel: &Similarity<'_>| !learned(channel).is_coarse;
+        let (channels, coarse): (Vec<_>, Vec<_>) = channels.into_iter().partition(is_fine);
+        let coarse = coarse.iter().map(|channel| channel.learned().channel);
+        let coarse: BTreeSet<SampleKey> = coarse.flat_map(|one| log.samples_of(one)).collect();
+        let is_of_fine = |matched: &&ViewMatch| !coarse.contains(&matched.now);
+        let fine = self.graph().matches.iter().filter(is_of_fine).copied();
+        self.set_matches(fine.collect());
+        let view_maps = channels.iter().map(|channel| channel.view_map().clone());
+        self.set_view_maps(view_maps.collect());
+        channels
     }
 
     /// The noises of rotations with which the map is matched, as factors of what is assumed: more
@@ -326,58 +336,4 @@ fn positions(graph: &KeyframeGraph, channel: &Similarity<'_>) -> Vec<Option<Poin
         is_somewhere(&pose.translation.vector).then(|| pose.translation.vector.into())
     };
     channel.samples().map(position).collect()
-}
-
-impl Problem {
-    /// Adds the links of the graph's matches: both samples are within the range of the channel of
-    /// one another, whatever their headings are.
-    pub(super) fn add_matches(&mut self, graph: &KeyframeGraph) {
-        let links = { graph.matches.iter() }
-            .map(|matched| {
-                let (link, kernel) = self.match_link(graph, matched, 1.0)?;
-                self.map.add_link(link, kernel).ok()
-            })
-            .collect();
-        self.matches = links;
-    }
-
-    /// Says that both samples of each match are within so many ranges of one another.
-    fn widen_matches(&mut self, graph: &KeyframeGraph, width: f64) {
-        for (matched, id) in graph.matches.iter().zip(self.matches.clone()) {
-            let Some((id, (link, _))) = id.zip(self.match_link(graph, matched, width)) else {
-                continue;
-            };
-            self.map.restate(id, link).ok();
-        }
-    }
-
-    fn switch_off_matches(&mut self) {
-        let links: Vec<LinkId> = self.matches.iter().flatten().copied().collect();
-        for link in links {
-            self.map.switch_off(link);
-        }
-    }
-
-    fn match_link(
-        &self,
-        graph: &KeyframeGraph,
-        matched: &ViewMatch,
-        width: f64,
-    ) -> Option<(Link, Kernel)> {
-        let [now, then] = [matched.now, matched.then].map(|sample| graph.chains.at_sample(sample));
-        let (now, then) = (now?, then?);
-        let sd_m = matched.sd_m * width;
-        let covariance = Matrix3::from_diagonal_element(sd_m * sd_m);
-        let link = Link::Sighting {
-            from: self.node(now.keyframe)?,
-            target: SightingTarget::PointOf(
-                self.node(then.keyframe)?,
-                then.motion.translation.vector,
-            ),
-            position: now.motion.translation.vector,
-            information: PositionInformation::of_covariance(&covariance).ok()?,
-        };
-        let scale = Scale::new((2.0 * matched.depth).sqrt()).ok()?;
-        Some((link, Kernel::GemanMcClure(scale)))
-    }
 }

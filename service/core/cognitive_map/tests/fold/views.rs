@@ -58,6 +58,12 @@ fn range_m(from: &Vector2<f64>, along: &Vector2<f64>, pillars: &[(Vector2<f64>, 
 
 /// A robot that drives round a hall, with odometry that turns too little for each metre.
 fn drive(views: Views, rounds: f64) -> Drive {
+    let noise = PoseNoise::new([0.01, 0.01, 0.0], [0.0, 0.0, 0.01]).unwrap();
+    drive_stating(Some(noise), views, rounds)
+}
+
+/// The same, whose odometry states a noise or none.
+fn drive_stating(noise: Option<PoseNoise>, views: Views, rounds: f64) -> Drive {
     let mut random = Seeded(3);
     let pillars = pillars(&mut random);
     let mut drive = Drive {
@@ -77,7 +83,7 @@ fn drive(views: Views, rounds: f64) -> Drive {
     for side_m in sides.iter().cycle() {
         let mut on_m = *side_m;
         while on_m > 0.0 && left_m > 0.0 {
-            bodies.push(read(&mut pose, STEP_M, 0.0, &mut random));
+            bodies.push(read(&mut pose, STEP_M, 0.0, noise, &mut random));
             bodies.extend(view(&pose, &pillars, views, &mut random));
             drive.truth.push(pose.translation.vector.into());
             (on_m, left_m) = (on_m - STEP_M, left_m - STEP_M);
@@ -87,6 +93,7 @@ fn drive(views: Views, rounds: f64) -> Drive {
                 &mut pose,
                 0.0,
                 std::f64::consts::FRAC_PI_6,
+                noise,
                 &mut random,
             ));
             drive.truth.push(pose.translation.vector.into());
@@ -110,13 +117,18 @@ fn drive(views: Views, rounds: f64) -> Drive {
 }
 
 /// Goes on, and answers what odometry reads.
-fn read(pose: &mut Isometry3<f64>, step_m: f64, turn: f64, random: &mut Seeded) -> SampleBody {
+fn read(
+    pose: &mut Isometry3<f64>,
+    step_m: f64,
+    turn: f64,
+    noise: Option<PoseNoise>,
+    random: &mut Seeded,
+) -> SampleBody {
     *pose *= Isometry3::new(Vector3::x() * step_m, Vector3::z() * turn);
     let turn = turn - 0.008 * step_m + 0.01 * random.normal();
     let rotation = UnitQuaternion::from_euler_angles(0.0, 0.0, turn);
-    let noise = PoseNoise::new([0.01, 0.01, 0.0], [0.0, 0.0, 0.01]).unwrap();
     let step = [step_m + 0.01 * random.normal(), 0.0, 0.0];
-    let motion = Motion::from_increment(step, rotation.coords.into(), Some(noise));
+    let motion = Motion::from_increment(step, rotation.coords.into(), noise);
     SampleBody::Motion(motion.unwrap())
 }
 
@@ -183,6 +195,14 @@ fn a_way_that_is_driven_again_is_recognised_by_what_a_laser_sees() {
 }
 
 #[test]
+fn a_way_is_recognised_by_a_robot_that_states_no_noise() {
+    let (by_odometry, _) = errors_m(&drive(Views::None, 3.0));
+    let (live, refined) = errors_m(&drive_stating(None, Views::Hall, 3.0));
+    assert!(refined < 0.1 * by_odometry, "{refined} {by_odometry}");
+    assert!(live < 0.4 * by_odometry, "{live} {by_odometry}");
+}
+
+#[test]
 fn views_that_say_nothing_change_nothing() {
     let (live, refined) = errors_m(&drive(Views::Noise, 2.0));
     // The same drive: noise is drawn in the same order.
@@ -199,10 +219,19 @@ fn views_that_say_nothing_change_nothing() {
 
 #[test]
 fn a_restart_while_views_are_matched_makes_no_difference() {
-    let records = drive(Views::Hall, 2.0).records;
+    check_restarts(&drive(Views::Hall, 2.0));
+}
+
+#[test]
+fn a_restart_while_noise_is_found_makes_no_difference() {
+    check_restarts(&drive_stating(None, Views::Hall, 2.0));
+}
+
+/// Checks that a drive leads to the same map with and without restarts.
+fn check_restarts(drive: &Drive) {
     let fold = |every: usize| {
         let (mut map, mut events) = (CognitiveMap::new(Settings::default()), Vec::new());
-        for (at, record) in records.iter().enumerate() {
+        for (at, record) in drive.records.iter().enumerate() {
             map.apply(record, &mut events);
             if at % every == every - 1 {
                 map = CognitiveMap::restore(Settings::default(), map.checkpoint(0)).unwrap();
