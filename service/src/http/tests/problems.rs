@@ -281,6 +281,17 @@ async fn a_refusal_says_what_is_there_and_what_is_wanted() {
     let refused = "samples[1].body.increment.rotation_xyzw [0.0, 0.0, 0.0, 0.0]: \
         must be a unit quaternion [x, y, z, w]";
     assert_eq!(answer["refused"], serde_json::json!([refused]));
+    let behind = "{\"session\": 1, \"first_seq\": 2, \"samples\": [{\"stamp_ns\": 9, \"body\": \
+        {\"sighting\": {\"target\": {\"landmark\": \"door\"}, \"relation\": \
+        {\"range\": {\"range_m\": -1, \"range_sd_m\": 0.1}}}}}]}";
+    let samples = "/v1/spaces/lab/agents/rover/samples";
+    let answer = rig.send(Method::POST, samples, JSON, behind).await.good();
+    let refused = answer["refused"][0].as_str().expect("a refusal");
+    assert!(
+        refused.starts_with("samples[0].body.sighting.relation {\"range\":{\"range_m\":-1.0")
+            && refused.ends_with("of at most 1e8, and no negative range"),
+        "{refused}"
+    );
     let path = "/v1/spaces/new";
     rig.send(Method::PUT, path, JSON, "{\"seed\": 7}").await;
     let other = rig.send(Method::PUT, path, JSON, "{\"seed\": 8}").await;

@@ -4,7 +4,8 @@ use cogmap::decode::core_settings;
 use cogmap_proto::SpaceSettings;
 use serde_json::Value;
 
-/// The settings of odometry are a table within those of a space; their names are no others'.
+/// The settings of odometry are a table within those of a space; their names are no others', so
+/// they may go without that of the table.
 const ODOMETRY: &str = "odometry_noise";
 
 /// One setting of a space, and its value.
@@ -28,9 +29,13 @@ impl Setting {
 
     fn set(&self, all: &mut Value) -> Option<()> {
         let name = self.name.as_str();
-        let slot = match all.get(name) {
-            Some(_) => all.get_mut(name),
-            None => all.get_mut(ODOMETRY).and_then(|table| table.get_mut(name)),
+        let of_odometry = name
+            .strip_prefix(ODOMETRY)
+            .and_then(|rest| rest.strip_prefix('.'));
+        let slot = match (of_odometry, all.get(name)) {
+            (None, Some(_)) => all.get_mut(name),
+            (of_odometry, _) => { all.get_mut(ODOMETRY) }
+                .and_then(|table| table.get_mut(of_odometry.unwrap_or(name))),
         };
         *slot? = self.value.clone();
         Some(())
@@ -59,12 +64,14 @@ mod tests {
 
     #[test]
     fn a_setting_is_found_also_among_those_of_odometry() {
-        let changed = ["bias_sd_rad_s=0", "keyframe_spacing_m=0.5"];
-        let changed: Vec<Setting> = changed.map(|text| Setting::read(text).unwrap()).into();
         let mut expected = SpaceSettings::default();
         expected.odometry_noise.bias_sd_rad_s = 0.0;
         expected.keyframe_spacing_m = 0.5;
-        assert_eq!(settings(&changed), Ok(expected));
+        for bias in ["bias_sd_rad_s=0", "odometry_noise.bias_sd_rad_s=0"] {
+            let changed = [bias, "keyframe_spacing_m=0.5"];
+            let changed: Vec<Setting> = changed.map(|text| Setting::read(text).unwrap()).into();
+            assert_eq!(settings(&changed).as_ref(), Ok(&expected));
+        }
         assert_eq!(settings(&[]), Ok(SpaceSettings::default()));
     }
 
@@ -73,6 +80,9 @@ mod tests {
         for (text, why) in [
             ("bias", "NAME=VALUE"),
             ("bias=0", "no setting"),
+            ("odometry_noise.bias=0", "no setting"),
+            ("odometry_noise.keyframe_spacing_m=1", "no setting"),
+            ("odometry_noise=0", "invalid type"),
             ("keyframe_spacing_m=wide", "expected"),
             ("keyframe_spacing_m=-1", "keyframe_spacing_m"),
             ("keyframe_spacing_m=true", "invalid type"),
