@@ -27,6 +27,8 @@ pub struct ViewMatch {
     pub now: SampleKey,
     /// The other one.
     pub then: SampleKey,
+    /// How far apart samples of one place are at most \[m\]: the range of the channel.
+    pub range_m: f64,
     /// Standard deviation of the distance between them along each axis \[m\].
     pub sd_m: f64,
     /// Log of the odds that they are of one place, as it may cost at most to leave that out.
@@ -39,20 +41,28 @@ impl ViewMatch {
         -(-self.depth).exp_m1()
     }
 
-    /// How far apart samples of one place are at most \[m\]: the range of the channel.
-    pub fn range_m(&self) -> f64 {
-        self.sd_m / RANGE_SD
+    /// The same in a map that is found: a match that is right with a probability p says p of what
+    /// a right one does, the second derivative of −ln(1 − p + p exp(−x²/2)) where x is zero. Where
+    /// matches still have to find the map, all of them pull alike.
+    fn weighed(&self) -> Self {
+        Self {
+            sd_m: RANGE_SD * self.range_m / self.probability().sqrt(),
+            ..*self
+        }
     }
 
     /// Whether a match that was read from a checkpoint is one.
     pub fn is_sound(&self) -> bool {
-        self.sd_m.is_finite() && self.sd_m > 0.0 && self.depth.is_finite() && self.depth >= 0.0
+        let lengths = [self.range_m, self.sd_m];
+        let are_lengths = lengths.iter().all(|one| one.is_finite() && *one > 0.0);
+        are_lengths && self.depth.is_finite() && self.depth >= 0.0
     }
 }
 
 state_of_struct!(ViewMatch {
     now,
     then,
+    range_m,
     sd_m,
     depth
 });
@@ -179,7 +189,8 @@ impl<'a> Similarity<'a> {
     /// The matches of each view with others, earlier or later, close to which a map has it that is
     /// right but for its details.
     pub fn matches_close(&self, positions: &[Option<Point3<f64>>]) -> Vec<ViewMatch> {
-        self.matches_within(tuning::CLOSE_RANGES, tuning::MATCHES, positions)
+        let close = self.matches_within(tuning::CLOSE_RANGES, tuning::MATCHES, positions);
+        close.iter().map(ViewMatch::weighed).collect()
     }
 
     /// At most so many matches of each view with others that a map has within so many ranges.
@@ -245,6 +256,7 @@ impl<'a> Similarity<'a> {
         ViewMatch {
             now: self.runs.views[now].sample,
             then: self.runs.views[then].sample,
+            range_m: self.learned.range_m,
             sd_m: RANGE_SD * self.learned.range_m,
             depth: odds.ln_1p().clamp(tuning::DEPTH.0, tuning::DEPTH.1),
         }

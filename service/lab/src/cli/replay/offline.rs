@@ -97,7 +97,7 @@ fn matched_views(found: &ViewMatch, team: &BTreeMap<&str, Robot>) -> Option<Matc
     };
     Some(MatchedViews {
         seen: [seen(&found.now)?, seen(&found.then)?],
-        range_m: found.range_m(),
+        range_m: found.range_m,
         probability: found.probability(),
     })
 }

@@ -179,6 +179,13 @@ fn close_matches_are_the_best_among_views_that_a_map_has_close() {
     let near = channel.matches_near(&beside);
     assert!(near.iter().filter(|one| is_third(one)).count() > 100);
     assert!(channel.matches_close(&vec![None; thrice.len()]).is_empty());
+    // What is doubtful says less of where it is.
+    let by_depth = |a: &&ViewMatch, b: &&ViewMatch| a.depth.total_cmp(&b.depth);
+    let doubtful = matches.iter().min_by(by_depth).unwrap();
+    let sure = matches.iter().max_by(by_depth).unwrap();
+    let unweighed = channel.matches_near(&map(0.0))[0];
+    assert!(doubtful.depth < sure.depth);
+    assert!(unweighed.sd_m <= sure.sd_m && sure.sd_m < doubtful.sd_m);
 }
 
 #[test]
