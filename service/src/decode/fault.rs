@@ -123,10 +123,9 @@ fn rule(field: &str, error: InvalidSample) -> String {
         (InvalidSample::NumberOutOfRange, "angular_rad_s") => {
             format!("must be finite, and at most {RADIANS_PER_SECOND_MAX} rad/s")
         }
-        (
-            InvalidSample::NumberOutOfRange,
-            "translation_m" | "linear_m_s" | "offset_m" | "position_m",
-        ) => format!("must be finite, and at most {METRES_MAX:e}"),
+        (InvalidSample::NumberOutOfRange, "translation_m" | "linear_m_s" | "offset_m") => {
+            format!("must be finite, and at most {METRES_MAX:e}")
+        }
         (InvalidSample::NumberOutOfRange, "value") => "must be finite".to_owned(),
         (InvalidSample::NumberOutOfRange, "relation") => {
             format!("must have finite numbers of at most {METRES_MAX:e}, and no negative range")

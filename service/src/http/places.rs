@@ -145,12 +145,11 @@ impl FromRequestParts<Service> for MemoryOfPath {
     }
 }
 
-/// There is no such memory.
-pub(crate) fn unknown(what: &str, name: &impl std::fmt::Display) -> Problem {
-    Problem::new(
-        Kind::UnknownMemory,
-        format!("the space has no {what} {name}"),
-    )
+/// There is no such memory. Its name is whatever somebody wrote into a path.
+pub(crate) fn unknown(what: &str, name: &impl std::fmt::Debug) -> Problem {
+    let name = format!("{name:?}");
+    let detail = format!("the space has no {what} {name:.80}");
+    Problem::new(Kind::UnknownMemory, detail)
 }
 
 /// There was such a memory.

@@ -306,8 +306,9 @@ async fn a_memory_that_is_not_there_is_called_by_its_name() {
         ("places/7", "the space has no place 7"),
         ("trips/8", "the space has no trip 8"),
         ("trips/8/pin", "the space has no trip 8"),
-        ("landmarks/post", "the space has no landmark post"),
-        ("objects/cup", "the space has no object cup"),
+        ("landmarks/post", "the space has no landmark \"post\""),
+        ("objects/cup", "the space has no object \"cup\""),
+        ("objects/%1B", "the space has no object \"\\u{1b}\""),
     ] {
         let request = match path {
             "trips/8/pin" => Request::put(format!("/v1/spaces/lab/{path}")),

@@ -73,16 +73,30 @@ impl RelaxationCopy {
             chance.log_gain(closure, self.graph().is_planar(closure), &problem)
         };
         let closures = copy.accepted().map(gain);
-        closures.sum::<f64>() - 0.5 * problem.map.chi_squared() + self.log_volume(&problem)
-    }
-
-    /// Log of how much of what was possible before is probable by a relaxed map, by Laplace's
-    /// approximation about it and up to a constant: −½ ln |H| − n ln s, as above.
-    pub(super) fn log_volume(&self, problem: &Problem) -> f64 {
         let chains = &self.graph().chains;
         let noise = { (0..).zip(chains.tracks.iter()) }
+            .filter(|(_, track)| track.is_in_map())
             .map(|(agent, track)| turns(chains, agent, track.is_planar) * track.turn_noise.ln());
-        -0.5 * problem.map.marginals().log_determinant() - noise.sum::<f64>()
+        let misfit = problem.map.chi_squared() + problem.map.marginals().log_determinant();
+        closures.sum::<f64>() - 0.5 * misfit - noise.sum::<f64>()
+    }
+
+    /// Log of the share that matches of views leave of the maps that were possible without them, by
+    /// Laplace's approximation about a relaxed map: with the matrices H and H₀ of the normal
+    /// equations with and without them
+    ///
+    /// ```text
+    /// ln v = −½ ln |H| + ½ ln |H₀|
+    /// ```
+    pub(super) fn log_volume_matched(&self) -> f64 {
+        if self.graph().matches.is_empty() {
+            return 0.0;
+        }
+        let mut problem = Problem::new(self.graph(), Among::Accepted, Calibrating::Free);
+        problem.map.relax(&RelaxationSettings::default());
+        let matched = problem.map.marginals().log_determinant();
+        problem.switch_off_matches();
+        0.5 * (problem.map.marginals().log_determinant() - matched)
     }
 }
 

@@ -91,6 +91,8 @@ impl KeyframeGraph {
         if as_it_is.has_pending() {
             // What is accepted by views alone was judged by them.
             all = as_it_is.judged_anew();
+            // Those that accept nothing have forgotten what views tell of the noise.
+            all.retain(|copy| copy.accepted().next().is_some());
         }
         as_it_is.accept_consistent();
         let best = RelaxationCopy::most_probable(as_it_is, all);

@@ -168,7 +168,8 @@ impl RelaxationCopy {
         // With kernels that begin wide, all closures together find the map that most of them agree
         // with.
         let is_other = |track: &AgentTrack| track.turn_noise.to_bits() != 1.0_f64.to_bits();
-        let calibrating = if self.graph.chains.tracks.iter().any(is_other) {
+        let is_by_closures = self.only_long_runs || self.accepted().next().is_some();
+        let calibrating = if is_by_closures && self.graph.chains.tracks.iter().any(is_other) {
             // Noise that was learned, or is supposed, is what there is beside lasting errors.
             Calibrating::Free
         } else {

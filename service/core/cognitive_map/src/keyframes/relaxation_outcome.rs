@@ -9,6 +9,7 @@ use super::graph::KeyframeGraph;
 use super::keyframe::Keyframe;
 use super::live_estimates::LiveEstimates;
 use super::relaxation::Correction;
+use super::tuning;
 use crate::estimator::ExternalEstimate;
 use geometry::is_somewhere;
 use state::{CorruptState, Digest, NONE, State, StateReader, StateWriter};
@@ -102,12 +103,14 @@ impl RelaxationOutcome {
         let is_correction = |correction: &Correction| {
             (correction.agent as usize) < agents && is_pose(&correction.estimate.pose)
         };
-        let are_agents = self.turn_noises.iter().all(|one| (one.0 as usize) < agents);
+        let is_noise = |one: &(u32, f64)| {
+            (one.0 as usize) < agents && tuning::TURN_NOISE_BOUNDS.contains(&one.1)
+        };
         self.poses.is_sorted_by(|a, b| a.0 < b.0)
             && self.poses.iter().all(|(_, pose)| is_pose(pose))
             && self.matches.iter().flatten().all(ViewMatch::is_sound)
             && self.learned.iter().flatten().all(LearnedChannel::is_sound)
-            && are_agents
+            && self.turn_noises.iter().all(is_noise)
             && self.corrections.iter().all(is_correction)
     }
 }

@@ -22,8 +22,6 @@ struct Matched {
     copy: RelaxationCopy,
     /// Log of how probable the views and the odometry are by it, up to a constant.
     log_probability: f64,
-    /// What that becomes for all maps near it, up to a constant of the same keyframes.
-    log_evidence: f64,
     /// How probable the best other map has to be.
     log_probability_needed: f64,
 }
@@ -53,6 +51,9 @@ impl RelaxationCopy {
         let channels = self.learned_channels(log, matching);
         let ranges = channels.iter().map(|channel| channel.learned().range_m);
         let before = Arc::clone(&self.graph().matches);
+        if before.is_empty() && self.accepted().next().is_none() {
+            self.set_turn_noise(1.0); // nothing is left that told another
+        }
         let Some(range_m) = ranges.min_by(f64::total_cmp) else {
             return before != held;
         };
@@ -71,7 +72,11 @@ impl RelaxationCopy {
             let thinned = thinned.with_turn_noise(noise);
             thinned.best_map(matching, &channels, &before, another_map)
         });
-        let Some(mut best) = maps.reduce(Matched::more_evident) else {
+        let more_evident = |one: Matched, other: Matched| {
+            let is_more = other.log_evidence(another_map) > one.log_evidence(another_map);
+            if is_more { other } else { one }
+        };
+        let Some(mut best) = maps.reduce(more_evident) else {
             return before != held;
         };
         if before.is_empty() && best.copy.graph().matches.is_empty() {
@@ -212,17 +217,14 @@ impl RelaxationCopy {
             });
         }
         copy.move_keyframes(&problem);
-        let log_volume = copy.log_volume(&problem);
         problem.switch_off_matches();
         let graph = copy.graph();
         let evidence: f64 = { channels.iter() }
             .map(|channel| channel.evidence(&positions(graph, channel)))
             .sum();
-        let log_probability = evidence - 0.5 * problem.map.chi_squared();
         Matched {
             copy,
-            log_probability,
-            log_evidence: log_probability + log_volume,
+            log_probability: evidence - 0.5 * problem.map.chi_squared(),
             log_probability_needed: f64::NEG_INFINITY,
         }
     }
@@ -245,13 +247,13 @@ impl RelaxationCopy {
 }
 
 impl Matched {
-    /// The one of two maps of different noises that is more evident; the first if both are equally.
-    fn more_evident(self, other: Self) -> Self {
-        if other.log_evidence > self.log_evidence {
-            other
-        } else {
-            self
-        }
+    /// How probable all maps near it are together: that of the best by its noise, times how much of
+    /// what was possible before is as probable. Another map than that of odometry is so much less
+    /// probable beforehand.
+    fn log_evidence(&self, another_map: f64) -> f64 {
+        let is_other = !self.copy.graph().matches.is_empty();
+        let before = if is_other { another_map } else { 0.0 };
+        self.log_probability + self.copy.log_volume_matched() - before
     }
 
     /// The same, relaxed twice by matches that are near to one another by it.
