@@ -8,8 +8,8 @@ use super::problem::Problem;
 use pose_graph::{Kernel, Link, LinkId, PositionInformation, Scale, SightingTarget};
 
 impl Problem {
-    /// Adds the links of the graph's matches: both samples are within the range of the channel of
-    /// one another, whatever their headings are.
+    /// Adds the links of the graph's matches: both samples are at one place up to the standard
+    /// deviation of the match, whatever their headings are.
     pub(super) fn add_matches(&mut self, graph: &KeyframeGraph) {
         let links = { graph.matches.iter() }
             .map(|matched| {
@@ -20,7 +20,7 @@ impl Problem {
         self.matches = links;
     }
 
-    /// Says that both samples of each match are within so many ranges of one another.
+    /// States the standard deviation of each match as so many times what it is.
     pub(super) fn widen_matches(&mut self, graph: &KeyframeGraph, width: f64) {
         for (matched, id) in graph.matches.iter().zip(self.matches.clone()) {
             let Some((id, (link, _))) = id.zip(self.match_link(graph, matched, width)) else {
@@ -30,6 +30,7 @@ impl Problem {
         }
     }
 
+    /// Leaves the matches out, and all poses where they are.
     pub(super) fn switch_off_matches(&mut self) {
         let links: Vec<LinkId> = self.matches.iter().flatten().copied().collect();
         for link in links {
