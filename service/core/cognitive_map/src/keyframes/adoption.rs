@@ -110,7 +110,7 @@ impl KeyframeMap {
 impl KeyframeGraph {
     /// Changes the closures of an outcome, moves the agents with their latest keyframes, and
     /// answers where the agents are.
-    fn bring_into_force(&mut self, outcome: &RelaxationOutcome) -> Vec<Correction> {
+    pub(super) fn bring_into_force(&mut self, outcome: &RelaxationOutcome) -> Vec<Correction> {
         let revision = self.revision;
         let is_later = |number| { self.meanwhile.iter() }.any(|m| m.constraints.contains(&number));
         let judged = outcome.states.iter().copied();
@@ -135,6 +135,12 @@ impl KeyframeGraph {
         for &(agent, turn_noise) in &outcome.turn_noises {
             if let Some(track) = self.track_mut(agent) {
                 track.turn_noise = turn_noise;
+            }
+        }
+        let is_by_views = !self.matches.is_empty();
+        for correction in &outcome.corrections {
+            if let Some(track) = self.track_mut(correction.agent) {
+                track.is_calibrated_by_views = is_by_views;
             }
         }
         let carried_on = |correction| self.carried_on(correction);

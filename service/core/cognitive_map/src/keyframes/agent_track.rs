@@ -40,6 +40,9 @@ pub(super) struct AgentTrack {
     pub(super) since: MotionSum,
     /// Calibration with which that motion was corrected.
     pub(super) calibrated: Calibrated,
+    /// Whether the calibration is by matches of views: that was so with the latest relaxation which
+    /// corrected it.
+    pub(super) is_calibrated_by_views: bool,
     /// Whether all its odometry so far states its noise.
     pub(super) states_noise: bool,
     /// Factor of the noise of odometry's rotations, as closures show it, where it is not stated.
@@ -66,6 +69,7 @@ state_of_struct!(AgentTrack {
     until_ns,
     since,
     calibrated,
+    is_calibrated_by_views,
     states_noise,
     turn_noise,
     rest,
@@ -90,6 +94,7 @@ impl AgentTrack {
             until_ns: 0,
             since: MotionSum::default(),
             calibrated: Calibrated::default(),
+            is_calibrated_by_views: false,
             states_noise: true,
             turn_noise: 1.0,
             rest: Isometry3::identity(),

@@ -83,9 +83,10 @@ impl Calibrations {
         };
         let learned = track.calibrated.calibration.in_graph();
         let mut expected = match told.lengths {
-            Lengths::Estimated => learned,
-            // What the estimator has learned of rotations may be by closures that are judged here.
-            Lengths::Known => pose_graph::Calibration {
+            Lengths::Estimated if told.by_landmarks || !track.is_calibrated_by_views => learned,
+            // What the estimator has learned of rotations may be by closures and matches that are
+            // judged here.
+            Lengths::Estimated | Lengths::Known => pose_graph::Calibration {
                 length: learned.length,
                 ..pose_graph::Calibration::default()
             },
@@ -146,3 +147,6 @@ fn information(variances: &LastingErrors, veer: f64) -> CalibrationInformation {
     CalibrationInformation::of_variances(least[0], least[1], veer, &bias)
         .expect("variances above zero have an inverse")
 }
+
+#[cfg(test)]
+mod tests;

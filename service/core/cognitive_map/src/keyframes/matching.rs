@@ -18,6 +18,9 @@ pub(super) struct Matching {
     pub(super) widths: &'static [f64],
     /// How often the views are matched once more, close to where the best map has them.
     pub(super) close_matchings: usize,
+    /// Whether a map with more matches takes the place of the one that has held so far, if it is
+    /// less probable by less than half of what tells two maps apart: agents are corrected by it.
+    pub(super) prefers_more: bool,
     /// Whether views without matches are matched only if the new ones resemble others more than
     /// those before them did.
     pub(super) needs_news: bool,

@@ -222,6 +222,7 @@ pub(super) const LIVE_MATCHING: Matching = Matching {
     keyframes_max: 1024,
     widths: &[4.0, 2.0, 1.0],
     close_matchings: 0,
+    prefers_more: true,
     needs_news: true,
     veers: &[],
 };
@@ -232,6 +233,7 @@ pub(super) const LIVE_MATCHING_ANEW: Matching = Matching {
     views_max: 512,
     keyframes_max: 1024,
     close_matchings: 0,
+    prefers_more: true,
     ..REFINED_MATCHING
 };
 
@@ -242,6 +244,7 @@ pub(super) const REFINED_MATCHING: Matching = Matching {
     keyframes_max: 8192,
     widths: &[32.0, 16.0, 8.0, 4.0, 2.0, 1.0],
     close_matchings: 2,
+    prefers_more: false,
     needs_news: false,
     veers: &[0.0, -1.0, 1.0, -2.0, 2.0],
 };

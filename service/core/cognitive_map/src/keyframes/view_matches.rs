@@ -42,7 +42,8 @@ impl RelaxationCopy {
     /// Where the noise of rotations is not stated, maps are matched with each that is tried, and
     /// the noise is taken by which all maps near the best one are most probable together (the
     /// evidence of the model: `MacKay` 1992): too much lets a map fold onto itself, too little
-    /// keeps to odometry's.
+    /// keeps to odometry's. A map that has held is given up for odometry's only if that is so with
+    /// each noise.
     ///
     /// Beyond the most keyframes of [`Matching`], maps are compared by some of them, evenly spaced.
     /// Those between move with the one before.
@@ -72,8 +73,13 @@ impl RelaxationCopy {
             let thinned = thinned.with_turn_noise(noise);
             thinned.best_map(matching, &channels, &before, another_map)
         });
+        let keeps = |one: &Matched| before.is_empty() || one.n_matches() > 0;
         let more_evident = |one: Matched, other: Matched| {
-            let is_more = other.log_evidence(another_map) > one.log_evidence(another_map);
+            let is_more = if keeps(&one) == keeps(&other) {
+                other.log_evidence(another_map) > one.log_evidence(another_map)
+            } else {
+                keeps(&other)
+            };
             if is_more { other } else { one }
         };
         let Some(mut best) = maps.reduce(more_evident) else {
@@ -144,7 +150,9 @@ impl RelaxationCopy {
     }
 
     /// The map by which views and odometry are most probable: that of odometry, that of the matches
-    /// before, or one that is found from a start and more probable by `another_map` nats.
+    /// before, or one that is found from a start and more probable by `another_map` nats. That of
+    /// the matches before gives way to one with more of them ([`Matching::prefers_more`]): views
+    /// that came since are in no match before.
     fn best_map(
         &self,
         matching: &Matching,
@@ -152,7 +160,7 @@ impl RelaxationCopy {
         before: &ViewMatches,
         another_map: f64,
     ) -> Matched {
-        let mut best = self.with_matches(Arc::default(), &[1.0], channels);
+        let mut best = self.unmatched(channels);
         let needed = best.log_probability + another_map;
         if !before.is_empty() {
             let as_before = self.with_matches(Arc::clone(before), &[1.0], channels);
@@ -160,14 +168,34 @@ impl RelaxationCopy {
                 best = as_before;
             }
         }
+        let mut holds = best.n_matches() > 0;
         for start in self.starts(matching, channels, 2.0 * another_map) {
             let other = start.gated(channels);
-            if other.log_probability > needed.max(best.log_probability) {
-                best = other;
+            let has_more = holds && other.n_matches() > best.n_matches();
+            let admitted = if has_more && matching.prefers_more {
+                0.5 * another_map
+            } else {
+                0.0
+            };
+            if other.log_probability > needed.max(best.log_probability - admitted) {
+                (best, holds) = (other, false);
             }
         }
         best.log_probability_needed = needed;
         best
+    }
+
+    /// The map of odometry, and of what closures say.
+    ///
+    /// Without closures it is where dead reckoning leads. A relaxation from a map that views have
+    /// bent would have to unbend it first, and stops on the way.
+    fn unmatched(&self, channels: &[Similarity<'_>]) -> Matched {
+        let start = if self.accepted().next().is_none() {
+            self.dead_reckoned(0.0)
+        } else {
+            self.clone()
+        };
+        start.with_matches(Arc::default(), &[1.0], channels)
     }
 
     /// Copies relaxed by matches that were found wherever their keyframes are, from where they are
@@ -247,6 +275,10 @@ impl RelaxationCopy {
 }
 
 impl Matched {
+    fn n_matches(&self) -> usize {
+        self.copy.graph().matches.len()
+    }
+
     /// How probable all maps near it are together: that of the best by its noise, times how much of
     /// what was possible before is as probable. Another map than that of odometry is so much less
     /// probable beforehand.
