@@ -181,7 +181,7 @@ impl AgentFilter {
             .standing
             .take_in(&reading, duration_s, parameters.bias_sd_rad_s);
         let increment = reading.corrected_by(&self.calibration);
-        let variance = self.learned_variance(motion, &increment, parameters);
+        let (variance, assumed_turn) = self.learned_variance(motion, &increment, parameters);
         self.run.append(&reading, &increment, &variance);
         let wander = self.wander(&reading, parameters);
         self.run.wander += wander;
@@ -197,6 +197,7 @@ impl AgentFilter {
             displacement,
             increment,
             variance,
+            assumed_turn,
             calibrated: Calibrated {
                 calibration: self.calibration,
                 states_noise: motion.noise().is_some(),
@@ -208,21 +209,24 @@ impl AgentFilter {
         }
     }
 
-    /// Variances of a motion's noise, after what is known of this odometry.
+    /// Variances of a motion's noise, after what is known of this odometry, and those that are
+    /// assumed of its turn if it states none.
     #[inline]
     fn learned_variance(
         &mut self,
         motion: &Motion,
         increment: &Isometry3<f64>,
         parameters: &Parameters,
-    ) -> Vector6<f64> {
+    ) -> (Vector6<f64>, Option<Vector3<f64>>) {
         let squares = |sd: Vector6<f64>| sd.component_mul(&sd);
         let assumed = squares(parameters.assumed_noise_sd(motion.increment()));
         let stated = motion
             .noise()
             .map(|_| squares(parameters.motion_noise_sd(motion)));
         self.noise.append(increment, &assumed, stated.as_ref());
-        self.noise.variance(&assumed, stated.as_ref())
+        let learned = self.noise.variance(&assumed, stated.as_ref());
+        let turn = || assumed.fixed_rows::<3>(3).into_owned();
+        (learned, stated.is_none().then(turn))
     }
 
     /// What the variances of the calibration gain with a motion, up to where the settings bound

@@ -270,14 +270,20 @@ impl Frame {
         self.tell_members();
     }
 
-    /// Takes back what was assumed of a member's odometry, as soon as it is known to be better.
-    pub(super) fn take_back_noise(&mut self, index: usize, stamp_ns: i64) {
+    /// Takes back what was assumed of a member's odometry, as soon as it is known to be better: by
+    /// pairs of sightings, or for it `is_known` otherwise.
+    pub(super) fn take_back_noise(&mut self, index: usize, stamp_ns: i64, is_known: bool) {
         if self.members[index].filter().noise.trial.is_none() {
             return;
         }
         self.flush();
         let member = &mut self.members[index];
-        let Some(parts) = member.state_mut().filter.noise.end_trial(stamp_ns) else {
+        let Some(parts) = member
+            .state_mut()
+            .filter
+            .noise
+            .end_trial(stamp_ns, is_known)
+        else {
             return;
         };
         if self.covariance.take_back(member.agent, parts) {

@@ -42,7 +42,7 @@ impl Estimator {
             let filter = &mut state.filter;
             filter.learn_noise(called, stamp_ns, relation, is_doubted);
             if !is_doubted {
-                frame.take_back_noise(observer, stamp_ns);
+                frame.take_back_noise(observer, stamp_ns, false);
             }
         }
         let measurement = Measurement {

@@ -41,7 +41,7 @@ impl Estimator {
             interval_s.clamp(0.0, MOTION_INTERVAL_S_MAX)
         });
         let step = filter.step(motion, duration_s, &self.parameters);
-        ranging.go(&step.increment, &step.variance);
+        ranging.go(&step);
         filter.history.advance(stamp_ns, motion.increment());
         effects.push(Effect::Moved { agent, step });
         if filter.is_nowhere() {

@@ -75,6 +75,13 @@ pub(super) struct NoiseTrial {
     pub(super) by_angles: MotionSum,
 }
 
+/// The logarithm of a factor of a variance, as far as it is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LogFactor {
+    pub(super) mean: f64,
+    pub(super) variance: f64,
+}
+
 impl Default for OdometryNoise {
     fn default() -> Self {
         Self::new(false)
@@ -176,13 +183,13 @@ impl OdometryNoise {
 
     /// Ends the trial when the noise is known: answers the parts of the assumed noise, of lengths
     /// and of angles, that are not there; negative where there is more.
-    pub(super) fn end_trial(&mut self, stamp_ns: i64) -> Option<[f64; 2]> {
+    pub(super) fn end_trial(&mut self, stamp_ns: i64, is_known: bool) -> Option<[f64; 2]> {
         let trial = self.trial.as_mut()?;
         let begun_ns = *trial.seen_ns.get_or_insert(stamp_ns);
         let root = Self::with_prior(&self.information).cholesky()?;
         let variances = root.inverse().diagonal();
         let sd = [0, 1].map(|k| variances[k].sqrt());
-        let is_known = sd[1] <= NOISE_TRIAL_SD;
+        let is_known = is_known || sd[1] <= NOISE_TRIAL_SD;
         if !is_known && stamp_ns.saturating_sub(begun_ns) < NOISE_TRIAL_NS_MAX {
             return None;
         }
@@ -195,6 +202,22 @@ impl OdometryNoise {
             let more = (log - NOISE_SURELY_SD * sd[k]).max(0.0);
             1.0 - (less + more).exp()
         }))
+    }
+
+    /// A landmark was found by its distances alone, which says this of the noise that is assumed of
+    /// turns. Where pairs of sightings say more, or that there is more than is assumed, they are
+    /// believed.
+    pub(super) fn learn_turns(&mut self, learned: LogFactor) {
+        let prior = NOISE_PRIOR_SD[1].powi(-2);
+        let information = learned.variance.recip() - prior;
+        if self.is_stated || self.log_scales[1] > 0.0 || information <= self.information[(1, 1)] {
+            return;
+        }
+        self.information.row_mut(1).fill(0.0);
+        self.information.column_mut(1).fill(0.0);
+        self.information[(1, 1)] = information;
+        self.log_scales[1] = learned.mean.max(-NOISE_LOG_SCALE_MAX);
+        self.factors[1] = self.factor(1, learned.variance.sqrt());
     }
 
     /// Information about the logarithms of the factors, with what was known before.

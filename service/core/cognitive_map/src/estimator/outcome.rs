@@ -31,6 +31,9 @@ pub struct Step {
     /// Variances of the increment's noise along and about the body axes at its end \[m², rad²\].
     /// The lasting errors of odometry come on top.
     pub variance: Vector6<f64>,
+    /// Variances of the rotation's noise as the settings assume them \[rad²\], of odometry that
+    /// states none.
+    pub(super) assumed_turn: Option<Vector3<f64>>,
     /// How the increment was corrected.
     pub calibrated: Calibrated,
     /// What the odometry read of its bias while the body stood before.
@@ -50,6 +53,7 @@ impl Step {
             displacement: Vector3::zeros(),
             increment: Isometry3::identity(),
             variance: Vector6::zeros(),
+            assumed_turn: None,
             calibrated: Calibrated::default(),
             measured_bias: None,
         }

@@ -6,35 +6,32 @@
 //! beacons: Blanco, Fernández-Madrigal & González 2008). A point and its mirror image on the other
 //! side of a straight way stay apart until the robot turns.
 //!
+//! Odometry that does not state its noise may turn far better than is assumed, and beacons far
+//! away are lost in what is assumed. So each place is held with several parts of that noise, and
+//! the distances weigh them as they weigh the places.
+//!
 //! All is relative to the body, so that it does not matter where in the map the robot is, nor how
 //! sure that is. Only what odometry gets wrong between two distances blurs it.
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
+use super::doubtful_motion::DoubtfulMotion;
+use super::odometry_noise::LogFactor;
+use super::range_places::{PointHypothesis, Way, places};
 use super::tuning::{
-    DIRECTION_DISTANCE_MIN_M, RANGE_CURVED_MAX, RANGE_DOF, RANGE_HEIGHT_MAX_M,
-    RANGE_JOIN_ANGLE_RAD, RANGE_JOIN_MASS, RANGE_JOIN_SAG, RANGE_LAYER_RAD, RANGE_LAYERS,
-    RANGE_OUTLYING_SQUARE, RANGE_OVERLAP, RANGE_POINTS_MAX, RANGE_REFLECTED,
-    RANGE_REFLECTION_MAX_M, RANGE_RING_POINTS, RANGE_SPHERE_POINTS, RANGE_TRIAL_MIN,
-    RANGE_WEIGHT_MIN,
+    DIRECTION_DISTANCE_MIN_M, NOISE_PRIOR_SD, RANGE_CURVED_MAX, RANGE_DECIDED_MIN, RANGE_DOF,
+    RANGE_JOIN_ANGLE_RAD, RANGE_JOIN_MASS, RANGE_JOIN_SAG, RANGE_OUTLYING_SQUARE, RANGE_POINTS_MAX,
+    RANGE_REFLECTED, RANGE_REFLECTION_MAX_M, RANGE_TRIAL_MIN, RANGE_WEIGHT_MIN,
 };
 use crate::input::Range;
-use geometry::{MotionSum, seen_by_pose, symmetric};
-
-/// One of the places where a landmark may be, in the body frame.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct PointHypothesis {
-    pub(super) log_weight: f64,
-    pub(super) position: Vector3<f64>,
-    pub(super) covariance: Matrix3<f64>,
-}
+use geometry::{seen_by_pose, symmetric};
 
 /// The places where a landmark may be, as of its latest distance.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RangeHypotheses {
     pub(super) points: Vec<PointHypothesis>,
     /// The body's motion since then.
-    pub(super) motion: MotionSum,
+    pub(super) motion: DoubtfulMotion,
     /// The distance of the agent that was taken in last.
     pub(super) used: u64,
     /// The way since the first distance \[m\].
@@ -42,6 +39,8 @@ pub(super) struct RangeHypotheses {
     /// Distances that were taken in after the first, and how many of them fit none of the places.
     pub(super) taken: u32,
     pub(super) outlying: u32,
+    /// Distances in a row that left one place, the same one or another.
+    pub(super) decided: u32,
     /// Log of the density of these, by all places together.
     pub(super) log_evidence: f64,
     /// How far off the landmark is at most, for distances are never too short \[m\].
@@ -53,6 +52,9 @@ pub(super) struct RangeHypotheses {
 pub(super) struct RangedPoint {
     pub(super) position: Vector3<f64>,
     pub(super) covariance: Matrix3<f64>,
+    /// What finding it says of the noise that is assumed of turns, where there are several parts
+    /// that may be there.
+    pub(super) turn_noise: Option<LogFactor>,
 }
 
 /// The distance of an uncertain point from the antenna.
@@ -106,14 +108,15 @@ pub(super) fn loss_of_weight(square: f64) -> f64 {
 
 impl RangeHypotheses {
     /// Of a first distance, with its variance \[m²\].
-    pub(super) fn new(range: &Range, variance: f64, is_planar: bool) -> Self {
+    pub(super) fn new(range: &Range, variance: f64, way: Way) -> Self {
         Self {
-            points: places(range, variance, is_planar),
-            motion: MotionSum::default(),
+            points: places(range, variance, way),
+            motion: DoubtfulMotion::default(),
             path_m: 0.0,
             used: 0,
             taken: 0,
             outlying: 0,
+            decided: 0,
             log_evidence: 0.0,
             at_most_m: range.range_m() + 3.0 * variance.sqrt(),
         }
@@ -121,8 +124,11 @@ impl RangeHypotheses {
 
     /// A further distance, with its variance \[m²\]. If most of them fit none of the places, the
     /// beacon is elsewhere by now: then they begin anew with this one.
-    pub(super) fn update(&mut self, range: &Range, variance: f64, is_planar: bool) {
+    pub(super) fn update(&mut self, range: &Range, variance: f64, way: Way) {
         self.carry_over_motion();
+        if way.states_noise {
+            self.suppose_all_noise();
+        }
         let mut least = f64::INFINITY;
         for point in &mut self.points {
             least = least.min(point.update(range, variance));
@@ -130,14 +136,14 @@ impl RangeHypotheses {
         self.log_evidence += self.prune();
         self.taken += 1;
         if !self.points.is_empty() {
-            self.suppose_reflections(range, variance, is_planar);
+            self.suppose_reflections(range, variance, way);
         }
         self.at_most_m = self.at_most_m.min(range.range_m() + 3.0 * variance.sqrt());
         self.outlying += u32::from(least > RANGE_OUTLYING_SQUARE);
         if self.taken >= RANGE_TRIAL_MIN && 2 * self.outlying > self.taken || self.points.is_empty()
         {
             let used = self.used;
-            *self = Self::new(range, variance, is_planar);
+            *self = Self::new(range, variance, way);
             self.used = used;
         }
     }
@@ -145,14 +151,14 @@ impl RangeHypotheses {
     /// All distances before this one may have been those of reflections: adds the places where the
     /// landmark may be by this one alone, as far as that is probable beside the others. Reflected
     /// distances are too long, so this one is no longer than they admit.
-    fn suppose_reflections(&mut self, range: &Range, variance: f64, is_planar: bool) {
+    fn suppose_reflections(&mut self, range: &Range, variance: f64, way: Way) {
         let log_density = (RANGE_REFLECTED / RANGE_REFLECTION_MAX_M).ln();
         let log_mass = f64::from(self.taken) * log_density - self.log_evidence;
         let least = RANGE_WEIGHT_MIN.ln();
         if log_mass <= least || range.range_m() > self.at_most_m + 3.0 * variance.sqrt() {
             return;
         }
-        let mut added = places(range, variance, is_planar);
+        let mut added = places(range, variance, way);
         let room = RANGE_POINTS_MAX.saturating_sub(added.len());
         if added[0].log_weight + log_mass <= least || (self.points.len() > room && log_mass < 0.0) {
             return;
@@ -171,6 +177,14 @@ impl RangeHypotheses {
         self.log_evidence += self.normalise();
     }
 
+    /// Odometry states its noise: all of it is there.
+    fn suppose_all_noise(&mut self) {
+        if self.points.iter().any(|point| !point.has_all_noise()) {
+            self.points.retain(PointHypothesis::has_all_noise);
+            self.normalise();
+        }
+    }
+
     /// Moves the places to the body frame as it is now.
     fn carry_over_motion(&mut self) {
         let motion = std::mem::take(&mut self.motion);
@@ -179,10 +193,11 @@ impl RangeHypotheses {
         self.at_most_m += path_m;
         let back = motion.motion().inverse();
         let turn = back.rotation.to_rotation_matrix().into_inner();
-        let noise = *motion.covariance().matrix();
+        let [certain, assumed] = motion.covariances();
         for point in &mut self.points {
             point.position = back.transform_vector(&point.position) + back.translation.vector;
             let by_noise = seen_by_pose(&point.position);
+            let noise = certain + assumed * point.noise_part;
             let moved = turn * point.covariance * turn.transpose();
             point.covariance = symmetric(&(moved + by_noise * noise * by_noise.transpose()));
         }
@@ -210,16 +225,39 @@ impl RangeHypotheses {
         total
     }
 
+    /// What the distances say of the noise that is assumed of turns.
+    fn turn_noise(&self) -> Option<LogFactor> {
+        if self.points.iter().all(PointHypothesis::has_all_noise) {
+            return None;
+        }
+        let logs = self.points.iter().map(|point| {
+            let log = point.noise_part.ln();
+            (log, point.log_weight.exp())
+        });
+        let mean: f64 = logs.clone().map(|(log, weight)| log * weight).sum();
+        let variance: f64 = logs
+            .map(|(log, weight)| (log - mean).powi(2) * weight)
+            .sum();
+        // Between two parts all are as probable.
+        let step = NOISE_PRIOR_SD[1];
+        Some(LogFactor {
+            mean,
+            variance: variance + step * step / 12.0,
+        })
+    }
+
+    /// The one place that is left, if the latest distances all left one.
+    pub(super) fn decide(&mut self, range: &Range, variance: f64, way: Way) -> Option<RangedPoint> {
+        let point = self.point_left(range, variance, way);
+        self.decided = point.map_or(0, |_| self.decided.saturating_add(1));
+        point.filter(|_| self.decided >= RANGE_DECIDED_MIN)
+    }
+
     /// The one place that is left, if it is certain enough for the joint estimate, which is linear:
     /// an arc of its deviation σ must differ from its tangent, by σ²/2d, by less than a part of the
     /// deviation of a distance. A way longer than the distance hardly tells more than odometry
     /// loses meanwhile: then a wider arc will do, up to an angle.
-    pub(super) fn decided(
-        &self,
-        range: &Range,
-        variance: f64,
-        is_planar: bool,
-    ) -> Option<RangedPoint> {
+    fn point_left(&self, range: &Range, variance: f64, way: Way) -> Option<RangedPoint> {
         let later = |best: &PointHypothesis, next: &PointHypothesis| {
             next.log_weight.total_cmp(&best.log_weight).is_gt()
         };
@@ -233,7 +271,7 @@ impl RangeHypotheses {
         let widest = (RANGE_JOIN_ANGLE_RAD * distance_m).powi(2);
         let most = (linear * ways * ways).min(widest.max(linear));
         let flat = |apart: Vector3<f64>| {
-            if is_planar {
+            if way.is_planar {
                 apart.xy().norm_squared()
             } else {
                 apart.norm_squared()
@@ -252,7 +290,7 @@ impl RangeHypotheses {
             (point.covariance + apart * apart.transpose()) * weigh(point)
         };
         let covariance: Matrix3<f64> = symmetric(&near.iter().map(spread).sum::<Matrix3<f64>>());
-        let largest = if is_planar {
+        let largest = if way.is_planar {
             // What is above or below a planar robot is not for it to know.
             let level: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 0).into_owned();
             level.symmetric_eigenvalues().max()
@@ -261,9 +299,10 @@ impl RangeHypotheses {
         } else {
             f64::INFINITY
         };
-        (largest < most).then_some(RangedPoint {
+        (largest < most).then(|| RangedPoint {
             position,
             covariance,
+            turn_noise: self.turn_noise(),
         })
     }
 }
@@ -284,7 +323,10 @@ impl PointHypothesis {
         let noise = variance + curved;
         let square = innovation * innovation / (expected.linear + noise);
         let density = RangeDensity::new(innovation, expected.linear + noise);
-        self.log_weight += density.total().ln();
+        // Turns that were not read take a place along its ring and make it wide, and its distance
+        // none the less sure.
+        let thin = RangeDensity::new(innovation, expected.linear + variance);
+        self.log_weight += thin.total().ln();
         let direct = density.direct_share();
         let total = expected.linear + noise * loss_of_weight(square);
         let gain = self.covariance * expected.direction / total;
@@ -332,82 +374,5 @@ impl RangeDensity {
         } else {
             1.0
         }
-    }
-}
-
-/// Where a landmark may be by one distance, with equal weights.
-fn places(range: &Range, variance: f64, is_planar: bool) -> Vec<PointHypothesis> {
-    let mut points = if is_planar {
-        rings(range, variance)
-    } else {
-        sphere(range, variance)
-    };
-    let log_weight = -(points.len() as f64).ln();
-    for point in &mut points {
-        point.log_weight = log_weight;
-    }
-    points
-}
-
-/// Rings about the antenna, in planes above it. What lies below it looks the same to a planar
-/// robot.
-fn rings(range: &Range, variance: f64) -> Vec<PointHypothesis> {
-    let range_m = range.range_m().max(DIRECTION_DISTANCE_MIN_M);
-    let mut points = Vec::new();
-    for layer in 0..RANGE_LAYERS {
-        let (sin, cos) = (RANGE_LAYER_RAD * f64::from(layer)).sin_cos();
-        let (height, radius) = (range_m * sin, range_m * cos);
-        if layer > 0 && height > RANGE_HEIGHT_MAX_M {
-            break;
-        }
-        // As dense everywhere, so that every height is as probable.
-        let n = (f64::from(RANGE_RING_POINTS) * cos).ceil();
-        let spacing = std::f64::consts::TAU / n;
-        let upwards = (RANGE_OVERLAP * RANGE_LAYER_RAD * range_m).min(0.5 * RANGE_HEIGHT_MAX_M);
-        let sd = [RANGE_OVERLAP * spacing * radius, upwards];
-        for k in (0..RANGE_RING_POINTS).map(f64::from).take_while(|&k| k < n) {
-            let (sin, cos) = (spacing * k).sin_cos();
-            let ahead = Vector3::new(radius * cos, radius * sin, height);
-            let along = Vector3::new(-sin, cos, 0.0);
-            points.push(hypothesis(range, variance, &ahead, &along, sd));
-        }
-    }
-    points
-}
-
-/// Points spread evenly over a sphere about the antenna (the lattice of Fibonacci; González 2010).
-fn sphere(range: &Range, variance: f64) -> Vec<PointHypothesis> {
-    let range_m = range.range_m().max(DIRECTION_DISTANCE_MIN_M);
-    let n = f64::from(RANGE_SPHERE_POINTS);
-    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-    let spacing = range_m * (4.0 * std::f64::consts::PI / n).sqrt();
-    let point = |k: u32| {
-        let height = 1.0 - (2.0 * f64::from(k) + 1.0) / n;
-        let (sin, cos) = (golden * f64::from(k)).sin_cos();
-        let level = (1.0 - height * height).sqrt();
-        let ahead = Vector3::new(level * cos, level * sin, height) * range_m;
-        let along = Vector3::new(-sin, cos, 0.0);
-        let sd = [RANGE_OVERLAP * spacing; 2];
-        hypothesis(range, variance, &ahead, &along, sd)
-    };
-    (0..RANGE_SPHERE_POINTS).map(point).collect()
-}
-
-/// A place at `ahead` of the antenna: uncertain by the distance's variance in that direction, and
-/// by `sd` along a level direction and across both.
-fn hypothesis(
-    range: &Range,
-    variance: f64,
-    ahead: &Vector3<f64>,
-    along: &Vector3<f64>,
-    sd: [f64; 2],
-) -> PointHypothesis {
-    let direction = ahead.normalize();
-    let axes = Matrix3::from_columns(&[direction, *along, direction.cross(along)]);
-    let variances = Vector3::new(variance, sd[0] * sd[0], sd[1] * sd[1]);
-    PointHypothesis {
-        log_weight: 0.0,
-        position: range.antenna_m() + ahead,
-        covariance: symmetric(&(axes * Matrix3::from_diagonal(&variances) * axes.transpose())),
     }
 }

@@ -9,6 +9,7 @@ use super::jacobian::Block;
 use super::landmark_archive::ArchivedLandmark;
 use super::measurement_update::{CorrectionScope, Measurement, PastPose, point_block};
 use super::range_hypotheses::{ExpectedRange, RangeDensity, loss_of_weight};
+use super::range_places::Way;
 use super::sensor::SightingTarget;
 use super::tuning::{
     ARCHIVE_WIDENING, RANGE_JOIN_WIDENING, RANGE_TOO_LONG_SQUARE, RANGES_TOO_LONG_MAX,
@@ -114,11 +115,19 @@ impl Frame {
         label: &Label,
     ) -> Outcome {
         let member = &mut self.members[measurement.observer];
-        let is_planar = member.filter().is_planar;
         let state = member.state_mut();
+        let way = Way {
+            is_planar: state.filter.is_planar,
+            states_noise: state.filter.noise.is_stated,
+        };
         let variance = state.range_sensor.variance(range.range_sd_m());
-        let decided = state.ranging.take_in(label, range, variance, is_planar);
+        let decided = state.ranging.take_in(label, range, variance, way);
         let verdict = decided.map_or(Verdict::Pending, |point| {
+            if let Some(learned) = point.turn_noise {
+                let observer = self.members[measurement.observer].state_mut();
+                observer.filter.noise.learn_turns(learned);
+                self.take_back_noise(measurement.observer, measurement.stamp_ns, true);
+            }
             self.make_room();
             let noise = point.covariance * RANGE_JOIN_WIDENING;
             self.learn_landmark(measurement, label, &point.position, &noise)

@@ -3,29 +3,30 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Vector6};
-
+use super::doubtful_motion::DoubtfulMotion;
+use super::outcome::Step;
 use super::range_hypotheses::{RangeHypotheses, RangedPoint};
+use super::range_places::Way;
 use super::tuning::RANGED_MAX;
 use crate::input::{Label, Range};
-use geometry::MotionSum;
 
 /// Where the landmarks may be of which an agent knows nothing but distances. A clone shares them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ranging {
     pub(super) landmarks: Arc<BTreeMap<Label, RangeHypotheses>>,
     /// Motion since the latest distance to any of them.
-    pub(super) since: MotionSum,
+    pub(super) since: DoubtfulMotion,
     /// Distances taken in.
     pub(super) taken: u64,
 }
 
 impl Ranging {
-    /// The agent moved, with these variances of the error on the right of the increment.
+    /// The agent moved.
     #[inline]
-    pub(super) fn go(&mut self, increment: &Isometry3<f64>, variance: &Vector6<f64>) {
+    pub(super) fn go(&mut self, step: &Step) {
         if !self.landmarks.is_empty() {
-            self.since.append(increment, variance);
+            let assumed = step.assumed_turn.as_ref();
+            self.since.append(&step.increment, &step.variance, assumed);
         }
     }
 
@@ -48,7 +49,7 @@ impl Ranging {
         label: &Label,
         range: &Range,
         variance: f64,
-        is_planar: bool,
+        way: Way,
     ) -> Option<RangedPoint> {
         self.taken += 1;
         let landmarks = Arc::make_mut(&mut self.landmarks);
@@ -57,9 +58,9 @@ impl Ranging {
             landmark.motion.extend(&since);
         }
         if let Some(landmark) = landmarks.get_mut(label) {
-            landmark.update(range, variance, is_planar);
+            landmark.update(range, variance, way);
             landmark.used = self.taken;
-            return landmark.decided(range, variance, is_planar);
+            return landmark.decide(range, variance, way);
         }
         if landmarks.len() >= RANGED_MAX {
             let oldest = landmarks.iter().min_by_key(|(_, landmark)| landmark.used);
@@ -67,7 +68,7 @@ impl Ranging {
                 landmarks.remove(&oldest);
             }
         }
-        let mut landmark = RangeHypotheses::new(range, variance, is_planar);
+        let mut landmark = RangeHypotheses::new(range, variance, way);
         landmark.used = self.taken;
         landmarks.insert(label.clone(), landmark);
         None

@@ -224,16 +224,21 @@ pub(super) const CIRCLE_VARIANCE_MAX: f64 = 30.0;
 // --- Distances alone
 // ---------------------------------------------------------------------------
 
-/// Landmarks of which an agent knows distances alone. Source: memory; each has up to 576 places of
-/// 104 bytes.
+/// Landmarks of which an agent knows distances alone. Source: memory; each has up to 1,728 places
+/// of 112 bytes, and some dozens after a few distances.
 pub(super) const RANGED_MAX: usize = 32;
 /// Most places where one of them may be. Source: twice those by one distance, for the first ones
 /// may have been those of reflections.
 pub(super) const RANGE_POINTS_MAX: usize = {
     let rings = (RANGE_LAYERS * RANGE_RING_POINTS) as usize;
     let sphere = RANGE_SPHERE_POINTS as usize;
-    2 * if rings > sphere { rings } else { sphere }
+    2 * RANGE_NOISE_PARTS.len() * if rings > sphere { rings } else { sphere }
 };
+/// Parts of the variance assumed of turns that may be there, and how probable they are beside one
+/// another. Source: none, one and two deviations of its logarithm ([`NOISE_PRIOR_SD`]) below what
+/// is assumed, exp(−2.2 k), with their densities exp(−k²/2).
+pub(super) const RANGE_NOISE_PARTS: [(f64, f64); 3] =
+    [(1.0, 1.0), (0.110_803, 0.606_531), (0.012_277, 0.135_335)];
 /// Places on a ring about the antenna. Source: with spacing and deviation of an eighth of a radian,
 /// an arc differs from its tangent by a hundredth of its radius.
 pub(super) const RANGE_RING_POINTS: u32 = 48;
@@ -261,6 +266,9 @@ pub(super) const RANGE_CURVED_MAX: f64 = 3.0;
 pub(super) const RANGE_WEIGHT_MIN: f64 = 1e-5;
 /// Weight of the places about the best one from which on it is the landmark's.
 pub(super) const RANGE_JOIN_MASS: f64 = 0.99;
+/// Distances in a row that must leave one place. Source: a single one may be that of a reflection
+/// and fit by chance.
+pub(super) const RANGE_DECIDED_MIN: u32 = 3;
 /// Largest sag of an arc of its deviation, in deviations of a distance.
 pub(super) const RANGE_JOIN_SAG: f64 = 0.1;
 /// Largest deviation of the direction of a landmark that joins after a long way \[rad\]. Source:

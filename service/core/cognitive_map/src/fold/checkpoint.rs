@@ -64,7 +64,7 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// version 31 not how many of their samples are lost. Version 32 learned of many views from the
 /// views themselves, and tried claims as often as at first. Version 33 matched views with the noise
 /// of rotations that is assumed, where nobody states it, and wrote no ranges of matches.
-const VERSION: u16 = 35;
+const VERSION: u16 = 36;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

@@ -14,6 +14,7 @@ use super::agent_filter::{AgentFilter, BODY_DIM, Run};
 use super::agent_slot::{AgentSlot, AgentState, Detached};
 use super::associations::{Association, Associations};
 use super::covariance::JointCovariance;
+use super::doubtful_motion::DoubtfulMotion;
 use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member};
 use super::frame_match::FrameMatch;
 use super::joint::Estimator;
@@ -24,7 +25,8 @@ use super::odometry_history::OdometryHistory;
 use super::odometry_noise::{NoiseTrial, OdometryNoise};
 use super::outcome::Evidence;
 use super::parameters::Parameters;
-use super::range_hypotheses::{PointHypothesis, RangeHypotheses};
+use super::range_hypotheses::RangeHypotheses;
+use super::range_places::PointHypothesis;
 use super::range_sensor::RangeSensor;
 use super::ranging::Ranging;
 use super::sensor::{Sensor, SightingTarget};
@@ -124,8 +126,10 @@ state_of_struct!(NoiseTrial {
 state_of_struct!(PointHypothesis {
     log_weight,
     position,
-    covariance
+    covariance,
+    noise_part
 });
+state_of_struct!(DoubtfulMotion { certain, assumed });
 state_of_struct!(RangeHypotheses {
     points as ListUpTo<RANGE_POINTS_MAX>,
     motion,
@@ -133,6 +137,7 @@ state_of_struct!(RangeHypotheses {
     used,
     taken,
     outlying,
+    decided,
     log_evidence,
     at_most_m
 });
