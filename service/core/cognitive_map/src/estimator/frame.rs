@@ -13,6 +13,7 @@ use super::covariance::JointCovariance;
 use super::jacobian::Block;
 use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
 use super::observers::Observers;
+use super::odometry_noise::Told;
 use super::parameters::Parameters;
 use super::tuning::{ANY_TURN_SD_RAD, ANY_TURN_SLACK, LANDMARKS_MAX};
 use crate::input::Label;
@@ -270,20 +271,15 @@ impl Frame {
         self.tell_members();
     }
 
-    /// Takes back what was assumed of a member's odometry, as soon as it is known to be better: by
-    /// pairs of sightings, or for it `is_known` otherwise.
-    pub(super) fn take_back_noise(&mut self, index: usize, stamp_ns: i64, is_known: bool) {
+    /// Takes back what was assumed of a member's odometry, as soon as it is known to be better.
+    /// Something has just told of it.
+    pub(super) fn take_back_noise(&mut self, index: usize, stamp_ns: i64, told: Told) {
         if self.members[index].filter().noise.trial.is_none() {
             return;
         }
         self.flush();
         let member = &mut self.members[index];
-        let Some(parts) = member
-            .state_mut()
-            .filter
-            .noise
-            .end_trial(stamp_ns, is_known)
-        else {
+        let Some(parts) = member.state_mut().filter.noise.end_trial(stamp_ns, told) else {
             return;
         };
         if self.covariance.take_back(member.agent, parts) {

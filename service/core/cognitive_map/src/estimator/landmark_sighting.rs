@@ -6,6 +6,7 @@ use super::effect::Effect;
 use super::innovation::as_far_as_it_says;
 use super::joint::Estimator;
 use super::measurement_update::Measurement;
+use super::odometry_noise::Told;
 use super::outcome::LandmarkOutcome;
 use super::verdict::Verdict;
 use crate::input::{Label, Relation};
@@ -42,7 +43,7 @@ impl Estimator {
             let filter = &mut state.filter;
             filter.learn_noise(called, stamp_ns, relation, is_doubted);
             if !is_doubted {
-                frame.take_back_noise(observer, stamp_ns, false);
+                frame.take_back_noise(observer, stamp_ns, Told::ByPairs);
             }
         }
         let measurement = Measurement {

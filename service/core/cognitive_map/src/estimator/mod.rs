@@ -62,6 +62,7 @@ mod level;
 mod measurement_update;
 mod merging;
 mod motion;
+mod noise_part;
 mod noise_share;
 mod observers;
 mod odometry_history;

@@ -20,15 +20,19 @@
 //! Errors of sensors that last cancel out in a pair. The bound c keeps false sightings from
 //! counting for more than others; κ₀ and κ make that right for Gaussian noise.
 //!
+//! A beacon that was found by its distances says how well the robot turned meanwhile
+//! ([`NoiseEvidence`]), which counts beside the pairs.
+//!
 //! - **Assumed noise** is multiplied by its factor; below one, by a part of it only
 //!   ([`NOISE_CAUTION`]). Until the factor is known it is not taken for less than one, and what it
 //!   was too large by is taken back then ([`NoiseTrial`]).
 //! - **Stated noise** counts at least. Beside it counts as much of the assumed noise as is certain
 //!   to be there, so that a robot that states too little does not bend the map.
 
-use nalgebra::{Isometry3, Matrix4, Matrix6, Vector4, Vector6};
+use nalgebra::{Cholesky, Isometry3, Matrix4, Matrix6, U4, Vector4, Vector6};
 
 use super::calibration::LastingErrors;
+use super::noise_part::{NoiseEvidence, NoisePart};
 use super::sighting_pair::{Anchor, NoisyMotion, Residual};
 use super::tuning::{
     NOISE_ANGLE_SD_MAX_RAD, NOISE_CAUTION, NOISE_LOG_SCALE_MAX, NOISE_LOG_STEP_MAX, NOISE_MEMORY,
@@ -46,7 +50,7 @@ pub(super) struct OdometryNoise {
     /// Logarithms of the factors of variances: of lengths and angles that odometry reads, of
     /// distances and directions that are seen.
     pub(super) log_scales: Vector4<f64>,
-    /// What pairs of sightings said about them, as information.
+    /// What pairs of sightings, and beacons that were found, said about them, as information.
     pub(super) information: Matrix4<f64>,
     /// What the assumed variances of lengths and of angles count for.
     pub(super) factors: [f64; 2],
@@ -75,11 +79,13 @@ pub(super) struct NoiseTrial {
     pub(super) by_angles: MotionSum,
 }
 
-/// The logarithm of a factor of a variance, as far as it is known.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct LogFactor {
-    pub(super) mean: f64,
-    pub(super) variance: f64,
+/// What has told of the noise of odometry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Told {
+    /// Pairs of sightings of one landmark.
+    ByPairs,
+    /// A landmark that was found by its distances alone.
+    ByBeacon,
 }
 
 impl Default for OdometryNoise {
@@ -183,41 +189,58 @@ impl OdometryNoise {
 
     /// Ends the trial when the noise is known: answers the parts of the assumed noise, of lengths
     /// and of angles, that are not there; negative where there is more.
-    pub(super) fn end_trial(&mut self, stamp_ns: i64, is_known: bool) -> Option<[f64; 2]> {
+    pub(super) fn end_trial(&mut self, stamp_ns: i64, told: Told) -> Option<[f64; 2]> {
         let trial = self.trial.as_mut()?;
-        let begun_ns = *trial.seen_ns.get_or_insert(stamp_ns);
+        // Who sees landmarks with their directions soon knows more than a beacon says.
+        if told == Told::ByBeacon && trial.seen_ns.is_some() {
+            return None;
+        }
         let root = Self::with_prior(&self.information).cholesky()?;
         let variances = root.inverse().diagonal();
         let sd = [0, 1].map(|k| variances[k].sqrt());
-        let is_known = is_known || sd[1] <= NOISE_TRIAL_SD;
-        if !is_known && stamp_ns.saturating_sub(begun_ns) < NOISE_TRIAL_NS_MAX {
-            return None;
-        }
-        self.trial = None;
-        Some([0, 1].map(|k| {
-            // The mean of a factor of which the logarithm is known to a deviation; more than one
-            // only as far as that is certain.
+        // The mean of a factor of which the logarithm is known to a deviation; more than one only
+        // as far as that is certain.
+        let not_there = [0, 1].map(|k| {
             let log = self.log_scales[k];
             let less = (log + sd[k] * sd[k] / 2.0).min(0.0);
             let more = (log - NOISE_SURELY_SD * sd[k]).max(0.0);
             1.0 - (less + more).exp()
-        }))
+        });
+        let is_over = match told {
+            Told::ByBeacon => not_there[1] > 0.0,
+            Told::ByPairs => {
+                let begun_ns = *trial.seen_ns.get_or_insert(stamp_ns);
+                let is_late = stamp_ns.saturating_sub(begun_ns) >= NOISE_TRIAL_NS_MAX;
+                sd[1] <= NOISE_TRIAL_SD || is_late
+            }
+        };
+        if !is_over {
+            return None;
+        }
+        self.trial = None;
+        Some(not_there)
     }
 
-    /// A landmark was found by its distances alone, which says this of the noise that is assumed of
-    /// turns. Where pairs of sightings say more, or that there is more than is assumed, they are
-    /// believed.
-    pub(super) fn learn_turns(&mut self, learned: LogFactor) {
-        let prior = NOISE_PRIOR_SD[1].powi(-2);
-        let information = learned.variance.recip() - prior;
-        if self.is_stated || self.log_scales[1] > 0.0 || information <= self.information[(1, 1)] {
+    /// A landmark was found by its distances alone, which says this of the assumed noise of turns.
+    pub(super) fn learn_turns(&mut self, seen: NoiseEvidence) {
+        if self.is_stated {
             return;
         }
-        self.information.row_mut(1).fill(0.0);
-        self.information.column_mut(1).fill(0.0);
-        self.information[(1, 1)] = information;
-        self.log_scales[1] = learned.mean.max(-NOISE_LOG_SCALE_MAX);
-        self.factors[1] = self.factor(1, learned.variance.sqrt());
+        let mut information = self.information;
+        information[(1, 1)] += seen.information;
+        let Some(root) = Self::with_prior(&information).cholesky() else {
+            return;
+        };
+        let mut score = Vector4::zeros();
+        score[1] = seen.score - seen.information * self.log_scales[1];
+        let most = NOISE_LOG_SCALE_MAX;
+        let mut learned = self.log_scales + root.solve(&score);
+        // Beacons lead no further than the parts of the noise that were tried.
+        let (least, before) = (NoisePart::Least.log_factor(), self.log_scales[1]);
+        learned[1] = learned[1].clamp(least.min(before), before.max(0.0));
+        self.log_scales = learned.map(|log| log.clamp(-most, most));
+        self.information = information;
+        self.weigh_factors(&root);
     }
 
     /// Information about the logarithms of the factors, with what was known before.
@@ -339,7 +362,12 @@ impl OdometryNoise {
             (log + step).clamp(-most, most)
         });
         self.information = information * (1.0 - 1.0 / NOISE_MEMORY);
-        let variances = root.inverse().diagonal();
+        self.weigh_factors(&root);
+    }
+
+    /// What is learned counts, with this information.
+    fn weigh_factors(&mut self, information: &Cholesky<f64, U4>) {
+        let variances = information.inverse().diagonal();
         self.factors = [0, 1].map(|k| self.factor(k, variances[k].sqrt()));
     }
 
@@ -357,3 +385,6 @@ impl OdometryNoise {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

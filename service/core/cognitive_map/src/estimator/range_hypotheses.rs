@@ -16,12 +16,12 @@
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use super::doubtful_motion::DoubtfulMotion;
-use super::odometry_noise::LogFactor;
-use super::range_places::{PointHypothesis, Way, places};
+use super::noise_part::{NoiseEvidence, NoisePart};
+use super::range_places::{OdometryKind, PointHypothesis, places};
 use super::tuning::{
-    DIRECTION_DISTANCE_MIN_M, NOISE_PRIOR_SD, RANGE_CURVED_MAX, RANGE_DECIDED_MIN, RANGE_DOF,
-    RANGE_JOIN_ANGLE_RAD, RANGE_JOIN_MASS, RANGE_JOIN_SAG, RANGE_OUTLYING_SQUARE, RANGE_POINTS_MAX,
-    RANGE_REFLECTED, RANGE_REFLECTION_MAX_M, RANGE_TRIAL_MIN, RANGE_WEIGHT_MIN,
+    DIRECTION_DISTANCE_MIN_M, RANGE_CURVED_MAX, RANGE_DECIDED_MIN, RANGE_DOF, RANGE_JOIN_ANGLE_RAD,
+    RANGE_JOIN_MASS, RANGE_JOIN_SAG, RANGE_OUTLYING_SQUARE, RANGE_POINTS_MAX, RANGE_REFLECTED,
+    RANGE_REFLECTION_MAX_M, RANGE_TRIAL_MIN, RANGE_WEIGHT_MIN,
 };
 use crate::input::Range;
 use geometry::{seen_by_pose, symmetric};
@@ -52,9 +52,8 @@ pub(super) struct RangeHypotheses {
 pub(super) struct RangedPoint {
     pub(super) position: Vector3<f64>,
     pub(super) covariance: Matrix3<f64>,
-    /// What finding it says of the noise that is assumed of turns, where there are several parts
-    /// that may be there.
-    pub(super) turn_noise: Option<LogFactor>,
+    /// What finding it says of the noise that is assumed of turns, of odometry that states none.
+    pub(super) turn_noise: Option<NoiseEvidence>,
 }
 
 /// The distance of an uncertain point from the antenna.
@@ -108,9 +107,9 @@ pub(super) fn loss_of_weight(square: f64) -> f64 {
 
 impl RangeHypotheses {
     /// Of a first distance, with its variance \[m²\].
-    pub(super) fn new(range: &Range, variance: f64, way: Way) -> Self {
+    pub(super) fn new(range: &Range, variance: f64, odometry: OdometryKind) -> Self {
         Self {
-            points: places(range, variance, way),
+            points: places(range, variance, odometry),
             motion: DoubtfulMotion::default(),
             path_m: 0.0,
             used: 0,
@@ -124,9 +123,9 @@ impl RangeHypotheses {
 
     /// A further distance, with its variance \[m²\]. If most of them fit none of the places, the
     /// beacon is elsewhere by now: then they begin anew with this one.
-    pub(super) fn update(&mut self, range: &Range, variance: f64, way: Way) {
+    pub(super) fn update(&mut self, range: &Range, variance: f64, odometry: OdometryKind) {
         self.carry_over_motion();
-        if way.states_noise {
+        if odometry.states_noise {
             self.suppose_all_noise();
         }
         let mut least = f64::INFINITY;
@@ -136,14 +135,14 @@ impl RangeHypotheses {
         self.log_evidence += self.prune();
         self.taken += 1;
         if !self.points.is_empty() {
-            self.suppose_reflections(range, variance, way);
+            self.suppose_reflections(range, variance, odometry);
         }
         self.at_most_m = self.at_most_m.min(range.range_m() + 3.0 * variance.sqrt());
         self.outlying += u32::from(least > RANGE_OUTLYING_SQUARE);
         if self.taken >= RANGE_TRIAL_MIN && 2 * self.outlying > self.taken || self.points.is_empty()
         {
             let used = self.used;
-            *self = Self::new(range, variance, way);
+            *self = Self::new(range, variance, odometry);
             self.used = used;
         }
     }
@@ -151,14 +150,14 @@ impl RangeHypotheses {
     /// All distances before this one may have been those of reflections: adds the places where the
     /// landmark may be by this one alone, as far as that is probable beside the others. Reflected
     /// distances are too long, so this one is no longer than they admit.
-    fn suppose_reflections(&mut self, range: &Range, variance: f64, way: Way) {
+    fn suppose_reflections(&mut self, range: &Range, variance: f64, odometry: OdometryKind) {
         let log_density = (RANGE_REFLECTED / RANGE_REFLECTION_MAX_M).ln();
         let log_mass = f64::from(self.taken) * log_density - self.log_evidence;
         let least = RANGE_WEIGHT_MIN.ln();
         if log_mass <= least || range.range_m() > self.at_most_m + 3.0 * variance.sqrt() {
             return;
         }
-        let mut added = places(range, variance, way);
+        let mut added = places(range, variance, odometry);
         let room = RANGE_POINTS_MAX.saturating_sub(added.len());
         if added[0].log_weight + log_mass <= least || (self.points.len() > room && log_mass < 0.0) {
             return;
@@ -177,11 +176,17 @@ impl RangeHypotheses {
         self.log_evidence += self.normalise();
     }
 
-    /// Odometry states its noise: all of it is there.
+    /// Odometry states its noise: all of it is there. The evidence is that of the places which
+    /// supposed so.
     fn suppose_all_noise(&mut self) {
-        if self.points.iter().any(|point| !point.has_all_noise()) {
-            self.points.retain(PointHypothesis::has_all_noise);
-            self.normalise();
+        if self
+            .points
+            .iter()
+            .any(|point| point.noise_part != NoisePart::All)
+        {
+            self.points
+                .retain(|point| point.noise_part == NoisePart::All);
+            self.log_evidence += self.normalise() - NoisePart::All.log_prior();
         }
     }
 
@@ -197,7 +202,7 @@ impl RangeHypotheses {
         for point in &mut self.points {
             point.position = back.transform_vector(&point.position) + back.translation.vector;
             let by_noise = seen_by_pose(&point.position);
-            let noise = certain + assumed * point.noise_part;
+            let noise = certain + assumed * point.noise_part.factor();
             let moved = turn * point.covariance * turn.transpose();
             point.covariance = symmetric(&(moved + by_noise * noise * by_noise.transpose()));
         }
@@ -226,29 +231,21 @@ impl RangeHypotheses {
     }
 
     /// What the distances say of the noise that is assumed of turns.
-    fn turn_noise(&self) -> Option<LogFactor> {
-        if self.points.iter().all(PointHypothesis::has_all_noise) {
-            return None;
-        }
-        let logs = self.points.iter().map(|point| {
-            let log = point.noise_part.ln();
-            (log, point.log_weight.exp())
-        });
-        let mean: f64 = logs.clone().map(|(log, weight)| log * weight).sum();
-        let variance: f64 = logs
-            .map(|(log, weight)| (log - mean).powi(2) * weight)
-            .sum();
-        // Between two parts all are as probable.
-        let step = NOISE_PRIOR_SD[1];
-        Some(LogFactor {
-            mean,
-            variance: variance + step * step / 12.0,
-        })
+    fn turn_noise(&self) -> Option<NoiseEvidence> {
+        NoiseEvidence::of_weights(NoisePart::EACH.map(|part| {
+            let held = self.points.iter().filter(|point| point.noise_part == part);
+            held.map(|point| point.log_weight.exp()).sum()
+        }))
     }
 
     /// The one place that is left, if the latest distances all left one.
-    pub(super) fn decide(&mut self, range: &Range, variance: f64, way: Way) -> Option<RangedPoint> {
-        let point = self.point_left(range, variance, way);
+    pub(super) fn decide(
+        &mut self,
+        range: &Range,
+        variance: f64,
+        odometry: OdometryKind,
+    ) -> Option<RangedPoint> {
+        let point = self.point_left(range, variance, odometry);
         self.decided = point.map_or(0, |_| self.decided.saturating_add(1));
         point.filter(|_| self.decided >= RANGE_DECIDED_MIN)
     }
@@ -257,7 +254,12 @@ impl RangeHypotheses {
     /// an arc of its deviation σ must differ from its tangent, by σ²/2d, by less than a part of the
     /// deviation of a distance. A way longer than the distance hardly tells more than odometry
     /// loses meanwhile: then a wider arc will do, up to an angle.
-    fn point_left(&self, range: &Range, variance: f64, way: Way) -> Option<RangedPoint> {
+    fn point_left(
+        &self,
+        range: &Range,
+        variance: f64,
+        odometry: OdometryKind,
+    ) -> Option<RangedPoint> {
         let later = |best: &PointHypothesis, next: &PointHypothesis| {
             next.log_weight.total_cmp(&best.log_weight).is_gt()
         };
@@ -271,7 +273,7 @@ impl RangeHypotheses {
         let widest = (RANGE_JOIN_ANGLE_RAD * distance_m).powi(2);
         let most = (linear * ways * ways).min(widest.max(linear));
         let flat = |apart: Vector3<f64>| {
-            if way.is_planar {
+            if odometry.is_planar {
                 apart.xy().norm_squared()
             } else {
                 apart.norm_squared()
@@ -290,7 +292,7 @@ impl RangeHypotheses {
             (point.covariance + apart * apart.transpose()) * weigh(point)
         };
         let covariance: Matrix3<f64> = symmetric(&near.iter().map(spread).sum::<Matrix3<f64>>());
-        let largest = if way.is_planar {
+        let largest = if odometry.is_planar {
             // What is above or below a planar robot is not for it to know.
             let level: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 0).into_owned();
             level.symmetric_eigenvalues().max()
@@ -302,7 +304,9 @@ impl RangeHypotheses {
         (largest < most).then(|| RangedPoint {
             position,
             covariance,
-            turn_noise: self.turn_noise(),
+            turn_noise: (!odometry.states_noise)
+                .then(|| self.turn_noise())
+                .flatten(),
         })
     }
 }
@@ -323,10 +327,10 @@ impl PointHypothesis {
         let noise = variance + curved;
         let square = innovation * innovation / (expected.linear + noise);
         let density = RangeDensity::new(innovation, expected.linear + noise);
-        // Turns that were not read take a place along its ring and make it wide, and its distance
-        // none the less sure.
-        let thin = RangeDensity::new(innovation, expected.linear + variance);
-        self.log_weight += thin.total().ln();
+        // Turns that were not read, and a height that is not known, take a place along its sphere,
+        // where its distance stays as sure.
+        let across = RangeDensity::new(innovation, expected.linear + variance);
+        self.log_weight += across.total().ln();
         let direct = density.direct_share();
         let total = expected.linear + noise * loss_of_weight(square);
         let gain = self.covariance * expected.direction / total;

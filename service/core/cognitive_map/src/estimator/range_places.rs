@@ -2,9 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::noise_part::NoisePart;
 use super::tuning::{
-    DIRECTION_DISTANCE_MIN_M, RANGE_HEIGHT_MAX_M, RANGE_LAYER_RAD, RANGE_LAYERS, RANGE_NOISE_PARTS,
-    RANGE_OVERLAP, RANGE_RING_POINTS, RANGE_SPHERE_POINTS,
+    DIRECTION_DISTANCE_MIN_M, RANGE_HEIGHT_MAX_M, RANGE_LAYER_RAD, RANGE_LAYERS, RANGE_OVERLAP,
+    RANGE_RING_POINTS, RANGE_SPHERE_POINTS,
 };
 use crate::input::Range;
 use geometry::symmetric;
@@ -15,52 +16,47 @@ pub(super) struct PointHypothesis {
     pub(super) log_weight: f64,
     pub(super) position: Vector3<f64>,
     pub(super) covariance: Matrix3<f64>,
-    /// The part of the variance that is assumed of turns which is supposed to be there.
-    pub(super) noise_part: f64,
+    /// How much of the noise that is assumed of turns is supposed to be there.
+    pub(super) noise_part: NoisePart,
 }
 
-/// How a robot moves, and what it says of that.
+/// The odometry of a robot that measures distances.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Way {
+pub(super) struct OdometryKind {
     pub(super) is_planar: bool,
     pub(super) states_noise: bool,
 }
 
-impl PointHypothesis {
-    /// Whether all of the assumed noise is supposed to be there.
-    pub(super) fn has_all_noise(&self) -> bool {
-        self.noise_part >= 1.0
+impl OdometryKind {
+    /// How much of the assumed noise may be there, with the logarithms of the probabilities. Noise
+    /// that is stated is.
+    fn noise_parts(self) -> Vec<(NoisePart, f64)> {
+        if self.states_noise {
+            return vec![(NoisePart::All, 0.0)];
+        }
+        let with_prior = |part: NoisePart| (part, part.log_prior());
+        NoisePart::EACH.map(with_prior).to_vec()
     }
 }
 
-/// All of the noise that odometry states is there.
-const ALL_OF_THE_NOISE: [(f64, f64); 1] = [(1.0, 1.0)];
-
 /// Where a landmark may be by one distance: all places are as probable, each with every part of
-/// assumed noise.
-pub(super) fn places(range: &Range, variance: f64, way: Way) -> Vec<PointHypothesis> {
-    let places = if way.is_planar {
+/// the assumed noise.
+pub(super) fn places(range: &Range, variance: f64, odometry: OdometryKind) -> Vec<PointHypothesis> {
+    let places = if odometry.is_planar {
         rings(range, variance)
     } else {
         sphere(range, variance)
     };
     let even = (places.len() as f64).ln();
-    let parts = if way.states_noise {
-        &ALL_OF_THE_NOISE[..]
-    } else {
-        &RANGE_NOISE_PARTS[..]
-    };
-    let total: f64 = parts.iter().map(|(_, weight)| weight).sum();
-    let with = |&(noise_part, weight): &(f64, f64)| {
-        let log_weight = (weight / total).ln() - even;
-        let place = move |place: &PointHypothesis| PointHypothesis {
-            log_weight,
+    let mut points = Vec::new();
+    for (noise_part, log_prior) in odometry.noise_parts() {
+        points.extend(places.iter().map(|place| PointHypothesis {
+            log_weight: log_prior - even,
             noise_part,
             ..place.clone()
-        };
-        places.iter().map(place)
-    };
-    parts.iter().flat_map(with).collect()
+        }));
+    }
+    points
 }
 
 /// Rings about the antenna, in planes above it. What lies below it looks the same to a planar
@@ -121,7 +117,7 @@ fn hypothesis(
     let variances = Vector3::new(variance, sd[0] * sd[0], sd[1] * sd[1]);
     PointHypothesis {
         log_weight: 0.0,
-        noise_part: 1.0,
+        noise_part: NoisePart::All,
         position: range.antenna_m() + ahead,
         covariance: symmetric(&(axes * Matrix3::from_diagonal(&variances) * axes.transpose())),
     }

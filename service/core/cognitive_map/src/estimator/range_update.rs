@@ -8,16 +8,31 @@ use super::frame::Frame;
 use super::jacobian::Block;
 use super::landmark_archive::ArchivedLandmark;
 use super::measurement_update::{CorrectionScope, Measurement, PastPose, point_block};
+use super::noise_part::NoiseEvidence;
+use super::odometry_noise::Told;
 use super::range_hypotheses::{ExpectedRange, RangeDensity, loss_of_weight};
-use super::range_places::Way;
+use super::range_places::OdometryKind;
 use super::sensor::SightingTarget;
 use super::tuning::{
-    ARCHIVE_WIDENING, RANGE_JOIN_WIDENING, RANGE_TOO_LONG_SQUARE, RANGES_TOO_LONG_MAX,
-    REFUSED_TO_FORGET, REFUSED_TO_WIDEN,
+    ARCHIVE_WIDENING, RANGE_INFORMATION_MIN, RANGE_JOIN_WIDENING, RANGE_TOO_LONG_SQUARE,
+    RANGES_TOO_LONG_MAX, REFUSED_TO_FORGET, REFUSED_TO_WIDEN,
 };
 use super::verdict::{Outcome, Verdict};
 use crate::input::{Label, Range};
 use geometry::{beside, seen_by_pose};
+
+/// The part of a distance's information that is left when it is direct with this probability β, and
+/// else says nothing.
+///
+/// Its innovation ν then counts with the gain β, and what is not known of it adds to the covariance
+/// (Bar-Shalom & Tse 1975):
+///
+/// ```text
+/// P⁺ = P − (β − β (1 − β) ν² / S) K S Kᵀ
+/// ```
+fn information_left(direct: f64, innovation_m: f64, total: f64) -> f64 {
+    1.0 - (1.0 - direct) * innovation_m * innovation_m / total
+}
 
 /// A target of a distance, as the estimate has it.
 struct Ranged {
@@ -116,18 +131,14 @@ impl Frame {
     ) -> Outcome {
         let member = &mut self.members[measurement.observer];
         let state = member.state_mut();
-        let way = Way {
+        let odometry = OdometryKind {
             is_planar: state.filter.is_planar,
             states_noise: state.filter.noise.is_stated,
         };
         let variance = state.range_sensor.variance(range.range_sd_m());
-        let decided = state.ranging.take_in(label, range, variance, way);
+        let decided = state.ranging.take_in(label, range, variance, odometry);
         let verdict = decided.map_or(Verdict::Pending, |point| {
-            if let Some(learned) = point.turn_noise {
-                let observer = self.members[measurement.observer].state_mut();
-                observer.filter.noise.learn_turns(learned);
-                self.take_back_noise(measurement.observer, measurement.stamp_ns, true);
-            }
+            self.learn_turn_noise(measurement, point.turn_noise);
             self.make_room();
             let noise = point.covariance * RANGE_JOIN_WIDENING;
             self.learn_landmark(measurement, label, &point.position, &noise)
@@ -139,6 +150,18 @@ impl Frame {
         let mut outcome = Outcome::nothing();
         (outcome.verdict, outcome.variance[0]) = (verdict, variance);
         outcome
+    }
+
+    /// A landmark was found by its distances alone, which says something of the observer's
+    /// odometry.
+    fn learn_turn_noise(&mut self, measurement: &Measurement<'_>, seen: Option<NoiseEvidence>) {
+        let state = self.members[measurement.observer].state_mut();
+        if let Some(seen) = seen
+            && !state.is_doubted()
+        {
+            state.filter.noise.learn_turns(seen);
+            self.take_back_noise(measurement.observer, measurement.stamp_ns, Told::ByBeacon);
+        }
     }
 
     /// Weighs a distance and takes it in.
@@ -173,8 +196,12 @@ impl Frame {
         let spread = projection.spread[(0, 0)] + curved;
         let residual = range.range_m() - expected.distance_m;
         let square = residual * residual / (spread + variance);
+        let known = projection.spread[(0, 0)];
+        let total = known + (variance + curved) * loss_of_weight(square);
+        let direct = RangeDensity::new(residual, spread + variance).direct_share();
+        let left = information_left(direct, residual, total);
         let member = self.members[measurement.observer].state_mut();
-        if residual > 0.0 && square > RANGE_TOO_LONG_SQUARE {
+        if residual > 0.0 && (square > RANGE_TOO_LONG_SQUARE || left < RANGE_INFORMATION_MIN) {
             member.too_long += 1;
             if member.too_long <= RANGES_TOO_LONG_MAX {
                 outcome.verdict = Verdict::Reflected;
@@ -198,12 +225,7 @@ impl Frame {
         member
             .range_sensor
             .note(seen, stamp_ns, sd_m, residual[0], spread);
-        // With the gain that a distance has which is direct with this probability, and else says
-        // nothing.
-        let direct = RangeDensity::new(residual[0], spread + variance).direct_share();
-        let known = projection.spread[(0, 0)];
-        let total = known + (variance + curved) * loss_of_weight(square);
-        let weighted = total / direct - known;
+        let weighted = total / (direct * left.max(RANGE_INFORMATION_MIN)) - known;
         let weighted = Vector1::new(weighted);
         self.take_in(measurement, projection, &residual, &weighted, scope);
         outcome.verdict = Verdict::Accepted {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::doubtful_motion::DoubtfulMotion;
 use super::outcome::Step;
 use super::range_hypotheses::{RangeHypotheses, RangedPoint};
-use super::range_places::Way;
+use super::range_places::OdometryKind;
 use super::tuning::RANGED_MAX;
 use crate::input::{Label, Range};
 
@@ -49,7 +49,7 @@ impl Ranging {
         label: &Label,
         range: &Range,
         variance: f64,
-        way: Way,
+        odometry: OdometryKind,
     ) -> Option<RangedPoint> {
         self.taken += 1;
         let landmarks = Arc::make_mut(&mut self.landmarks);
@@ -58,9 +58,9 @@ impl Ranging {
             landmark.motion.extend(&since);
         }
         if let Some(landmark) = landmarks.get_mut(label) {
-            landmark.update(range, variance, way);
+            landmark.update(range, variance, odometry);
             landmark.used = self.taken;
-            return landmark.decide(range, variance, way);
+            return landmark.decide(range, variance, odometry);
         }
         if landmarks.len() >= RANGED_MAX {
             let oldest = landmarks.iter().min_by_key(|(_, landmark)| landmark.used);
@@ -68,7 +68,7 @@ impl Ranging {
                 landmarks.remove(&oldest);
             }
         }
-        let mut landmark = RangeHypotheses::new(range, variance, way);
+        let mut landmark = RangeHypotheses::new(range, variance, odometry);
         landmark.used = self.taken;
         landmarks.insert(label.clone(), landmark);
         None

@@ -150,8 +150,8 @@ pub(super) const NOISE_SURELY_SD: f64 = 2.0;
 /// Part of the logarithm of a factor below one that counts. Source: a pair sees the noise of some
 /// seconds, while errors that change within minutes (slip on another floor) grow faster; *team*.
 pub(super) const NOISE_CAUTION: f64 = 0.25;
-/// Deviation of the logarithm of the factor of angles from which on the assumed noise that is not
-/// there is taken back. Source: a deviation is known within a sixth then.
+/// Deviation of the logarithm of the factor of angles, by pairs of sightings, from which on the
+/// assumed noise that is not there is taken back. Source: a deviation is known within a sixth then.
 pub(super) const NOISE_TRIAL_SD: f64 = 0.3;
 /// Longest time from the first sighting until then \[ns\].
 pub(super) const NOISE_TRIAL_NS_MAX: i64 = 60_000_000_000;
@@ -232,13 +232,11 @@ pub(super) const RANGED_MAX: usize = 32;
 pub(super) const RANGE_POINTS_MAX: usize = {
     let rings = (RANGE_LAYERS * RANGE_RING_POINTS) as usize;
     let sphere = RANGE_SPHERE_POINTS as usize;
-    2 * RANGE_NOISE_PARTS.len() * if rings > sphere { rings } else { sphere }
+    2 * RANGE_NOISE_PARTS * if rings > sphere { rings } else { sphere }
 };
-/// Parts of the variance assumed of turns that may be there, and how probable they are beside one
-/// another. Source: none, one and two deviations of its logarithm ([`NOISE_PRIOR_SD`]) below what
-/// is assumed, exp(−2.2 k), with their densities exp(−k²/2).
-pub(super) const RANGE_NOISE_PARTS: [(f64, f64); 3] =
-    [(1.0, 1.0), (0.110_803, 0.606_531), (0.012_277, 0.135_335)];
+/// Parts of the noise assumed of turns with which each place is held. Source: two deviations of
+/// what is known of it ([`NOISE_PRIOR_SD`]), in steps of one.
+pub(super) const RANGE_NOISE_PARTS: usize = 3;
 /// Places on a ring about the antenna. Source: with spacing and deviation of an eighth of a radian,
 /// an arc differs from its tangent by a hundredth of its radius.
 pub(super) const RANGE_RING_POINTS: u32 = 48;
@@ -283,6 +281,8 @@ pub(super) const RANGE_OUTLYING_SQUARE: f64 = 9.0;
 pub(super) const RANGE_TRIAL_MIN: u32 = 8;
 /// Squared innovation beyond which a distance that is too long is that of a reflection.
 pub(super) const RANGE_TOO_LONG_SQUARE: f64 = 25.0;
+/// Least part of a distance's information that counts, where it may be that of a reflection.
+pub(super) const RANGE_INFORMATION_MIN: f64 = 0.05;
 /// Distances in a row that are too long, from which on they contradict the estimate as any other
 /// sighting does. Source: where half are reflected, that many are once in a hundred thousand times.
 pub(super) const RANGES_TOO_LONG_MAX: u32 = 16;

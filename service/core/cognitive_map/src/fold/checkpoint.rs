@@ -63,7 +63,9 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// version 29 not how a sensor's sightings repeat, version 30 not how far agents have turned,
 /// version 31 not how many of their samples are lost. Version 32 learned of many views from the
 /// views themselves, and tried claims as often as at first. Version 33 matched views with the noise
-/// of rotations that is assumed, where nobody states it, and wrote no ranges of matches.
+/// of rotations that is assumed, where nobody states it, and wrote no ranges of matches. Version 34
+/// did not know which robots are calibrated by views, version 35 looked for beacons with all of the
+/// assumed noise.
 const VERSION: u16 = 36;
 
 const HEADER: u8 = 0;

@@ -187,7 +187,8 @@ fn wheels_better_than_assumed_find_far_beacons_as_if_they_had_said_so() {
     }
 }
 
-/// Beacons that are placed as if the wheels were better make nothing worse.
+/// Some beacons are placed as if the wheels were better. They help, though more is promised than is
+/// kept.
 #[test]
 fn wheels_as_assumed_are_not_misled_by_far_beacons() {
     let drives = Wheels {
@@ -201,4 +202,5 @@ fn wheels_as_assumed_are_not_misled_by_far_beacons() {
         drives.squared_m2.sqrt(),
         drives.reckoned_m2.sqrt()
     );
+    assert!(drives.nees < 6.0, "{}", drives.nees);
 }

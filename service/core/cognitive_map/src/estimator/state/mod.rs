@@ -19,6 +19,7 @@ use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member};
 use super::frame_match::FrameMatch;
 use super::joint::Estimator;
 use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
+use super::noise_part::NoisePart;
 use super::noise_share::NoiseShare;
 use super::observers::Observers;
 use super::odometry_history::OdometryHistory;
@@ -122,6 +123,11 @@ state_of_struct!(NoiseTrial {
     followed_ns,
     by_lengths,
     by_angles
+});
+state_of_enum!(NoisePart {
+    All = 0,
+    Less = 1,
+    Least = 2
 });
 state_of_struct!(PointHypothesis {
     log_weight,
