@@ -53,7 +53,9 @@ export function followKeys(actions: KeyActions): void {
     const target = event.target as HTMLElement;
     const isTyping = target.matches("input:not([type=range]), select");
     const isPressing = event.key === " " && target.matches("button");
-    if (isTyping || isPressing || event.ctrlKey || event.metaKey || event.altKey) {
+    // A dialog that is open takes Escape itself.
+    const isAsked = event.key === "Escape" && document.querySelector("dialog[open]") !== null;
+    if (isTyping || isPressing || isAsked || event.ctrlKey || event.metaKey || event.altKey) {
       return;
     }
     const seconds = event.shiftKey ? 10 : 1;

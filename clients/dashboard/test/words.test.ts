@@ -1,6 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { bytes, degrees, deviation, exact, metres, percent, span, time } from "../src/panel/format";
+import { inWords } from "../src/panel/event_feed";
 import { roundStep } from "../src/scene/bounds";
 
 test("numbers are short and have their units", () => {
@@ -25,4 +26,12 @@ test("stamps are told to a tenth of a second, and exactly where asked", () => {
 
 test("steps of a scale are round", () => {
   assert.deepEqual([0.9, 1, 1.1, 3, 7, 45].map(roundStep), [1, 1, 2, 5, 10, 50]);
+});
+
+test("samples that are not in the map are told with their numbers and why", () => {
+  const words = (fields: { [field: string]: unknown }): string | null =>
+    inWords({ kind: "samples_skipped", fields } as unknown as Parameters<typeof inWords>[0]);
+  const refused = words({ from: 4, to: 5, reason: "non_unit_quaternion" });
+  assert.equal(refused, "refused sample 4 (non unit quaternion)");
+  assert.equal(words({ from: 4, to: 7, reason: "lost" }), "samples 4 to 6 never came");
 });

@@ -49,10 +49,10 @@ export class Agent {
     return this.live.frame === "map";
   }
 
-  /** Standard deviation of the position along its worst axis, at most √trace [m]. */
+  /** Standard deviation of the position, over all axes: the status goes by it [m]. */
   get positionSdM(): number {
     const c = this.live.position_covariance_m2;
-    return Math.sqrt(Math.max(c[0], c[3], c[5], 0));
+    return Math.sqrt(Math.max(c[0] + c[3] + c[5], 0));
   }
 
   /** Angle of the body's x axis in the x-y plane of its frame, against x [rad]. */

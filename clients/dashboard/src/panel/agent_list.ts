@@ -83,8 +83,9 @@ export class AgentList {
     const touching = contacts === null ? "" : best === undefined ? "touching" : best.name;
     say(row.note, status === "localized" ? touching : status);
     row.note.className = `note ${status}`;
-    say(row.sd, `±${deviation(agent.positionSdM)}`);
-    row.sd.title = "Standard deviation of the position along the worst axis";
+    // Where it woke up is sure in its own frame alone: that says nothing of the map.
+    say(row.sd, agent.isPlaced ? `±${deviation(agent.positionSdM)}` : "");
+    row.sd.title = "Standard deviation of the position, over all axes";
     row.element.title = agent.isPlaced ? "" : "Not in the map yet: it is not drawn";
   }
 }

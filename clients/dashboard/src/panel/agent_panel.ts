@@ -89,10 +89,11 @@ export class AgentPanel {
       `${position(live.translation_m)} m`,
       agent.isPlaced ? "x, y, z in map" : "x, y, z in a frame of its own: it is not in the map yet",
     );
+    const turned = degrees(Math.max(...live.rotation_sd_rad));
     facts.set(
       "sure to",
-      `±${deviation(agent.positionSdM)}  ±${degrees(Math.max(...live.rotation_sd_rad))}`,
-      "Standard deviation along and about the worst axis; the ellipsoid shows two of them",
+      agent.isPlaced ? `±${deviation(agent.positionSdM)}  ±${turned}` : "unknown: not in the map",
+      "Standard deviation of the position, over all axes, and of the rotation about the worst one",
     );
     facts.set(
       "heading",

@@ -49,7 +49,7 @@ export function inWords({ kind, fields }: ShownEvent): string | null {
     case "object_split":
       return `found ${text("part")} not to be ${text("object")}`;
     case "samples_skipped":
-      return `lost samples ${text("from")} to ${text("to")}`;
+      return skipped(Number(fields["from"]), Number(fields["to"]), text("reason"));
     case "trip_forgotten":
       return `made room: trip ${text("trip")} was forgotten`;
     case "route_left":
@@ -63,6 +63,14 @@ export function inWords({ kind, fields }: ShownEvent): string | null {
     default:
       return null;
   }
+}
+
+/** Samples that are not in the map, with why: `from` is the first of them, `to` the first beyond. */
+function skipped(from: number, to: number, reason: string): string {
+  const last = to - 1;
+  const samples = last > from ? `samples ${from} to ${last}` : `sample ${from}`;
+  const why = reason.replaceAll("_", " ");
+  return reason === "lost" ? `${samples} never came` : `refused ${samples} (${why})`;
 }
 
 export class EventFeed {
