@@ -272,7 +272,7 @@ impl Frame {
     }
 
     /// Takes back what was assumed of a member's odometry, as soon as it is known to be better.
-    /// Something has just told of it.
+    /// `told` is what has just been learned from.
     pub(super) fn take_back_noise(&mut self, index: usize, stamp_ns: i64, told: Told) {
         if self.members[index].filter().noise.trial.is_none() {
             return;
