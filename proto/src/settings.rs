@@ -45,7 +45,8 @@ pub struct SpaceSettings {
     /// After this many samples of the space, by whichever agent, a use counts half as much for the
     /// strength of a place, trip or way.
     pub strength_half_life_samples: u32,
-    /// Closest two poses of a stored trajectory \[s\]: at most this often a row is kept.
+    /// Closest two poses of a stored trajectory \[s\]: at most this often a row is kept. The newest
+    /// pose is always its last row.
     pub trajectory_interval_s: f64,
     /// Deviation of a component of a sighting from what the estimate expects, in standard
     /// deviations, beyond which the whole sighting is refused. Smaller for a sensor that mixes

@@ -23,6 +23,7 @@ mod object_storage;
 mod relaxation;
 mod removal;
 mod settings;
+mod trajectories;
 mod window;
 
 const SPACE: &str = "lab";

@@ -20,12 +20,15 @@ const ROW_BYTES: usize = 64;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recorder {
     session: u64,
+    /// The last of them may be provisional: the newest pose, until one that is far enough from the
+    /// row before takes its place.
     rows: Vec<StampedPose>,
-    /// Stamp of the latest row of the session, also after its chunk has been handed out.
+    /// Stamp of the latest row of the session that stays, also after its chunk has been handed out.
     latest_ns: Option<i64>,
 }
 
-/// A recorder as it is stored: session, stamp of the latest row, and rows as a chunk has them.
+/// A recorder as it is stored: session, stamp of the latest row that stays, and rows as a chunk has
+/// them.
 type PlainRecorder = (u64, Option<i64>, Vec<u8>);
 
 /// Rows that are complete: a full chunk, or the rest of an ended session.
@@ -94,10 +97,11 @@ pub(crate) struct CorruptChunk;
 
 impl Recorder {
     /// Notes the pose of `agent` after a record has been applied to it, if the record moved or
-    /// corrected it and the latest row is at least `interval_ns` old. A start pose or a sighting at
-    /// the stamp of the latest row replaces that row. An agent that is not placed has no pose in
-    /// the map, and no rows. Returns a chunk when one is complete, and what is left when the agent
-    /// is removed.
+    /// corrected it. Rows that stay are at least `interval_ns` apart; a pose that is nearer to the
+    /// latest of them is the last row until the next one. A start pose or a sighting at the stamp
+    /// of the latest row replaces that row. An agent that is not placed has no pose in the map, and
+    /// no rows. Returns a chunk when one is complete, and what is left when the session has ended
+    /// or the agent is removed.
     pub fn note(&mut self, record: &Record, agent: &Agent, interval_ns: i64) -> Option<Chunk> {
         let (session, sample) = match record {
             Record::Sample {
@@ -133,10 +137,14 @@ impl Recorder {
                 Some(last) => *last = row,
                 None => return complete, // the replaced row is already in a chunk: keep the first
             },
+            Some(latest) if sample.stamp_ns <= latest => return complete,
             Some(latest) if sample.stamp_ns.saturating_sub(latest) < interval_ns => {
+                self.drop_provisional();
+                self.rows.push(row);
                 return complete;
             }
             _ => {
+                self.drop_provisional();
                 self.rows.push(row);
                 self.latest_ns = Some(sample.stamp_ns);
             }
@@ -153,9 +161,16 @@ impl Recorder {
         self.session
     }
 
-    /// Rows that are not yet in a chunk.
+    /// Rows that are not yet in a chunk, up to the newest pose.
     pub fn rows(&self) -> &[StampedPose] {
         &self.rows
+    }
+
+    fn drop_provisional(&mut self) {
+        let last_ns = self.rows.last().map(|row| row.stamp_ns);
+        if last_ns.is_some() && last_ns != self.latest_ns {
+            self.rows.pop();
+        }
     }
 
     fn take(&mut self) -> Option<Chunk> {
