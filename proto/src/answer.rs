@@ -70,6 +70,13 @@ pub struct AgentSummary {
     pub name: String,
     /// Its latest estimate; absent before its first motion, sighting or start pose.
     pub estimate: Option<Estimate>,
+    /// Whether the latest sample of its session ended it.
+    #[serde(default)]
+    pub session_ended: bool,
+    /// How long ago the service received a message of it \[s\]; null before the first one since the
+    /// service started, and from a node that follows the space.
+    #[serde(default)]
+    pub heard_ago_s: Option<f64>,
 }
 
 /// An agent: where it is, how sure that is, and how far its samples have come.
@@ -93,6 +100,13 @@ pub struct AgentDetail {
     /// Sightings of its own earlier samples that were dropped, because those were not remembered,
     /// or no longer; over all sessions.
     pub forgotten_matches: u64,
+    /// Whether the latest sample of its session ended it.
+    #[serde(default)]
+    pub session_ended: bool,
+    /// How long ago the service received a message of it \[s\]; null before the first one since the
+    /// service started, and from a node that follows the space.
+    #[serde(default)]
+    pub heard_ago_s: Option<f64>,
 }
 
 /// What became of an agent's sightings of landmarks and of other agents, over all sessions.

@@ -62,6 +62,13 @@ pub struct LiveAgent {
     pub lag_samples: u64,
     /// Contacts of the episode with an object that is under way; null where there is none.
     pub contacts: Option<u64>,
+    /// Whether the latest sample of its session ended it.
+    #[serde(default)]
+    pub session_ended: bool,
+    /// How long before the tick the service received a message of it \[s\]; null before the first
+    /// one since the service started.
+    #[serde(default)]
+    pub heard_ago_s: Option<f64>,
 }
 
 /// A sighting that was applied, as the line of sight in `map`.
@@ -117,8 +124,8 @@ pub struct LiveHealth {
 }
 
 impl LiveAgent {
-    /// The short form of an estimate, with what stands beside it.
-    pub fn of(estimate: &Estimate, lag_samples: u64, contacts: Option<u64>) -> Self {
+    /// The short form of an estimate; what it does not say is 0, none or false.
+    pub fn of(estimate: &Estimate) -> Self {
         // Rows of the upper triangle of six begin at 0, 6, 11, 15, 18 and 20.
         let c = &estimate.covariance;
         Self {
@@ -134,8 +141,10 @@ impl LiveAgent {
             rotation_sd_rad: [c[15], c[18], c[20]].map(|variance| variance.max(0.0).sqrt()),
             place: estimate.place,
             confidence: estimate.confidence,
-            lag_samples,
-            contacts,
+            lag_samples: 0,
+            contacts: None,
+            session_ended: false,
+            heard_ago_s: None,
         }
     }
 }

@@ -26,6 +26,10 @@ export interface LiveAgent {
   lag_samples: number;
   /** Contacts of the episode with an object under way; null where there is none. */
   contacts: number | null;
+  /** Whether the latest sample of its session ended it. */
+  session_ended: boolean;
+  /** How long before the tick a message of it came; null if none has since the service started [s]. */
+  heard_ago_s: number | null;
 }
 
 export interface EventRecord {

@@ -114,10 +114,14 @@ fn agents() -> AgentPage {
             AgentSummary {
                 name: "robot-1".to_owned(),
                 estimate: Some(estimate(Status::Localized)),
+                session_ended: true,
+                heard_ago_s: Some(75.5),
             },
             AgentSummary {
                 name: "robot-2".to_owned(),
                 estimate: None,
+                session_ended: false,
+                heard_ago_s: None,
             },
         ],
         next: Some("robot-2".to_owned()),
@@ -139,6 +143,8 @@ fn agent() -> AgentDetail {
         lag_samples: 12,
         travelled_m: 31.75,
         forgotten_matches: 3,
+        session_ended: true,
+        heard_ago_s: Some(0.25),
     }
 }
 
@@ -150,6 +156,8 @@ fn silent_agent() -> AgentDetail {
         lag_samples: 0,
         travelled_m: 0.0,
         forgotten_matches: 0,
+        session_ended: false,
+        heard_ago_s: None,
         ..agent()
     }
 }

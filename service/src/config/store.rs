@@ -45,10 +45,15 @@ section! {
 }
 
 impl StoreConfig {
-    /// Where the store is: its URL or its directory.
+    /// Where the store is: its URL or the whole path of its directory.
     pub fn place(&self) -> String {
         if self.url.is_empty() {
-            self.directory.display().to_string()
+            let whole = std::path::absolute(&self.directory);
+            whole
+                .as_ref()
+                .unwrap_or(&self.directory)
+                .display()
+                .to_string()
         } else {
             self.url.clone()
         }

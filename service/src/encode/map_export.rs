@@ -99,6 +99,8 @@ pub fn agent_summaries(space: &str, map: &CognitiveMap) -> Vec<AgentSummary> {
     let agents = map.agents().map(|(id, agent)| AgentSummary {
         name: agent.name().as_str().to_owned(),
         estimate: estimate(space, 0, map, id),
+        session_ended: agent.session_ended(),
+        heard_ago_s: None,
     });
     let mut agents: Vec<_> = agents.collect();
     agents.sort_by(|a, b| a.name.cmp(&b.name));

@@ -2,11 +2,13 @@
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::Instant;
 
 use arc_swap::ArcSwapOption;
 use cogmap_proto::limits::WATERMARK_REJECTIONS_MAX;
 use cogmap_proto::{
-    AgentDetail, EndedEpisode, Estimate, Evidence, Rejection, SeqRange, StampedPose, Watermark,
+    AgentDetail, AgentSummary, EndedEpisode, Estimate, Evidence, Rejection, SeqRange, StampedPose,
+    Watermark,
 };
 use cognitive_map::{AgentId, CognitiveMap};
 use serde::Serialize;
@@ -17,13 +19,15 @@ use super::trajectory::Recorder;
 use crate::encode;
 
 /// What is known of an agent outside its space's writer. Readers never hold the writer up: the
-/// readout is swapped whole, and the two locks guard a few words each.
+/// readout is swapped whole, and the locks guard a few words each.
 #[derive(Debug)]
 pub struct AgentView {
     id: AgentId,
     name: String,
     term: u64,
     readout: ArcSwapOption<Readout>,
+    /// When the latest message of it came; none since the start of the service.
+    heard: Mutex<Option<Instant>>,
     marks: Mutex<Marks>,
     recorder: Mutex<Recorder>,
     ended_episode: ArcSwapOption<EndedEpisode>,
@@ -38,6 +42,7 @@ pub(crate) struct Readout {
     pub(crate) evidence: Evidence,
     pub(crate) travelled_m: f64,
     pub(crate) forgotten_matches: u64,
+    pub(crate) session_ended: bool,
     /// Contacts of the episode with an object that is under way.
     pub(crate) contacts: Option<u64>,
     /// Its part of the agent's JSON, once someone has asked for it.
@@ -69,6 +74,8 @@ struct DetailTail {
     lag_samples: u64,
     travelled_m: f64,
     forgotten_matches: u64,
+    session_ended: bool,
+    heard_ago_s: Option<f64>,
 }
 
 /// How far an agent's samples have come.
@@ -102,6 +109,7 @@ impl AgentView {
             name: name.to_owned(),
             term,
             readout: ArcSwapOption::empty(),
+            heard: Mutex::default(),
             marks: Mutex::new(marks),
             recorder: Mutex::new(recorder),
             ended_episode: ArcSwapOption::empty(),
@@ -133,6 +141,29 @@ impl AgentView {
         let status = readout.as_ref().map(|readout| readout.estimate.status);
         let lag = self.lag();
         standing.note(status, lag.not_durable, lag.waiting);
+    }
+
+    /// How long ago the latest message of it came \[s\]; `None` if none has since the start of the
+    /// service.
+    pub fn heard_ago_s(&self) -> Option<f64> {
+        let heard = *self.heard.lock().unwrap_or_else(PoisonError::into_inner);
+        heard.map(|heard| heard.elapsed().as_secs_f64())
+    }
+
+    /// Notes when the latest message of it came.
+    pub(crate) fn hear(&self, at: Instant) {
+        *self.heard.lock().unwrap_or_else(PoisonError::into_inner) = Some(at);
+    }
+
+    /// What a list of agents says of it.
+    pub fn summary(&self) -> AgentSummary {
+        let readout = self.readout.load();
+        AgentSummary {
+            name: self.name.clone(),
+            estimate: readout.as_ref().map(|readout| readout.estimate.clone()),
+            session_ended: { readout.as_ref() }.is_some_and(|readout| readout.session_ended),
+            heard_ago_s: self.heard_ago_s(),
+        }
     }
 
     /// Its latest readout.
@@ -188,6 +219,8 @@ impl AgentView {
             lag_samples,
             travelled_m,
             forgotten_matches,
+            session_ended,
+            heard_ago_s,
         } = self.tail(readout.as_deref());
         AgentDetail {
             name: self.name.clone(),
@@ -198,6 +231,8 @@ impl AgentView {
             lag_samples,
             travelled_m,
             forgotten_matches,
+            session_ended,
+            heard_ago_s,
         }
     }
 
@@ -236,6 +271,8 @@ impl AgentView {
             lag_samples: marks.applied.saturating_sub(marks.durable) + marks.waiting,
             travelled_m: readout.map_or(0.0, |readout| readout.travelled_m),
             forgotten_matches: readout.map_or(0, |readout| readout.forgotten_matches),
+            session_ended: readout.is_some_and(|readout| readout.session_ended),
+            heard_ago_s: self.heard_ago_s(),
         }
     }
 
@@ -275,6 +312,7 @@ impl Readout {
             evidence: encode::evidence(agent),
             travelled_m: agent.travelled_m(),
             forgotten_matches: agent.forgotten_matches(),
+            session_ended: agent.session_ended(),
             contacts: agent.episode_contacts(),
             json: OnceLock::new(),
         })

@@ -3,7 +3,7 @@
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::{Response, StatusCode};
-use cogmap_proto::{AgentDetail, AgentPage, AgentSummary, GridState};
+use cogmap_proto::{AgentDetail, AgentPage, GridState};
 use serde::Deserialize;
 
 use super::extract::{
@@ -45,14 +45,7 @@ pub(crate) async fn list(
     space.available()?;
     let views = space.agents_after(query.after.as_deref(), limit + 1);
     let (views, next) = page::cut(views.into_iter(), limit, |view| view.name().to_owned());
-    let summary = |name: &str, estimate| AgentSummary {
-        name: name.to_owned(),
-        estimate,
-    };
-    let agents = views
-        .iter()
-        .map(|view| summary(view.name(), view.estimate()))
-        .collect();
+    let agents = views.iter().map(|view| view.summary()).collect();
     Ok(reply::json(&AgentPage { agents, next }))
 }
 

@@ -238,8 +238,8 @@ async fn map(long: &LongAnswers, space: &Arc<Space>) -> Result<Response<Body>, P
     let map = space.snapshot().await?;
     let views = space.agents_after(None, usize::MAX);
     let agents = views.iter().map(|view| AgentSummary {
-        name: view.name().to_owned(),
-        estimate: view.estimate(),
+        heard_ago_s: None, // it is of the moment, and not of the map
+        ..view.summary()
     });
     let (name, settings) = (space.name().to_owned(), space.settings().clone());
     let texts = encode::map_export(name, settings, map, agents.collect());

@@ -302,10 +302,10 @@ pub(crate) async fn whole_body(request: Request, service: &Service) -> Result<By
     Bytes::from_request(bounded, service)
         .await
         .map_err(|rejection| {
-            let kind = match rejection.status() {
-                StatusCode::PAYLOAD_TOO_LARGE => Kind::BodyTooLong,
-                _ => Kind::MalformedBody,
-            };
-            Problem::new(kind, rejection.body_text())
+            if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE {
+                let detail = format!("a body has at most {MESSAGE_BYTES_MAX} bytes");
+                return Problem::new(Kind::BodyTooLong, detail);
+            }
+            Problem::new(Kind::MalformedBody, rejection.body_text())
         })
 }

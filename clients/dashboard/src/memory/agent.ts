@@ -15,6 +15,10 @@ export class Agent {
   /** When its session began, until it is known where it is in `map` [s]. */
   private unplacedSinceS: number | null = null;
 
+  /** When a message of it came, on the clock of the page; null if none has since the service
+   * started [ms]. */
+  private heardMs: number | null = null;
+
   constructor(
     /** Which of the colours is its own. */
     readonly colour: number,
@@ -23,6 +27,17 @@ export class Agent {
 
   get name(): string {
     return this.live.name;
+  }
+
+  /** A tick that came at `nowMs` tells where it is. */
+  hear(live: LiveAgent, nowMs: number): void {
+    this.live = live;
+    this.heardMs = live.heard_ago_s === null ? null : nowMs - 1000 * live.heard_ago_s;
+  }
+
+  /** For how long nothing has come of it; null if nothing has since the service started [s]. */
+  silentS(nowMs: number): number | null {
+    return this.heardMs === null ? null : Math.max(nowMs - this.heardMs, 0) / 1000;
   }
 
   /** A session began: until the agent is placed, its poses are counted from where it woke up. */

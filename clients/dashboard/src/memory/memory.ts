@@ -18,6 +18,7 @@ import type {
 import { Agent } from "./agent";
 import { Clock } from "./clock";
 import { Cloud } from "./cloud";
+import { Spans } from "./spans";
 import { TripLog } from "./trip_log";
 import { Wayfinding } from "./wayfinding";
 
@@ -81,9 +82,7 @@ export class Memory {
   connection: Connection = { state: "connecting" };
   /** Whether the places were read at least once. */
   isLoaded = false;
-  /** Range of the stamps that came, on the view's clock [s]. */
-  begin = Infinity;
-  end = -Infinity;
+  private readonly spans = new Spans();
 
   private readonly stream: LiveStream;
   private readonly timers: number[];
@@ -132,6 +131,16 @@ export class Memory {
     this.timers.forEach((timer) => window.clearInterval(timer));
   }
 
+  /** Earliest stamp of the clock that is shown, on the view's clock [s]. */
+  get begin(): number {
+    return this.spans.begin;
+  }
+
+  /** Latest stamp of it [s]. */
+  get end(): number {
+    return this.spans.end;
+  }
+
   /** Names of the agents, those with numbers in the order of these. */
   agentNames(): string[] {
     return [...this.agents.keys()].sort(BY_NAME);
@@ -164,9 +173,9 @@ export class Memory {
           void this.readPast(agent, s - PAST_S);
         }
       }
-      agent.live = live;
+      agent.hear(live, began);
       agent.track.push(s, live.translation_m, live.rotation_xyzw);
-      this.note(s);
+      this.spans.hear(s, began);
     }
     tick.removed.forEach((name) => this.agents.delete(name));
     if (tick.missed !== null) {
@@ -238,11 +247,6 @@ export class Memory {
     }
   }
 
-  private note(s: number): void {
-    this.begin = Math.min(this.begin, s);
-    this.end = Math.max(this.end, s);
-  }
-
   /** Reads what changed in the map. */
   private async refresh(): Promise<void> {
     if (this.isRefreshing || this.isClosed || this.connection.state !== "live") {
@@ -308,7 +312,7 @@ export class Memory {
       const poses = await this.past(agent.name, "causal", fromS);
       agent.track.merge(poses);
       if (poses[0] !== undefined) {
-        this.note(poses[0].s);
+        this.spans.note(poses[0].s);
       }
       this.listener.refreshed();
     } catch (error) {

@@ -4,11 +4,13 @@ import type { Agent } from "../memory/agent";
 import type { Memory } from "../memory/memory";
 import { agentColour, type Palette } from "../scene/palette";
 import { h, say } from "./dom";
-import { deviation } from "./format";
+import { deviation, span } from "./format";
 import { glyph } from "./status";
 
 /** Rows that are made; with more agents the rest is counted. */
 const ROWS_MAX = 200;
+/** From this long on it is said that nothing has come of an agent [s]. */
+const SILENT_S = 10;
 
 interface Row {
   element: HTMLButtonElement;
@@ -81,11 +83,21 @@ export class AgentList {
     }
     const best = agent.touch?.identification?.objects[0];
     const touching = contacts === null ? "" : best === undefined ? "touching" : best.name;
-    say(row.note, status === "localized" ? touching : status);
+    const standing = [status === "localized" ? touching : status, presence(agent)];
+    say(row.note, standing.filter((word) => word !== "").join(" · "));
     row.note.className = `note ${status}`;
     // Where it woke up is sure in its own frame alone: that says nothing of the map.
     say(row.sd, agent.isPlaced ? `±${deviation(agent.positionSdM)}` : "");
     row.sd.title = "Standard deviation of the position, over all axes";
     row.element.title = agent.isPlaced ? "" : "Not in the map yet: it is not drawn";
   }
+}
+
+/** Whether its session has ended, or for how long nothing has come of it. */
+function presence(agent: Agent): string {
+  if (agent.live.session_ended) {
+    return "ended";
+  }
+  const silentS = agent.silentS(performance.now());
+  return silentS === null || silentS < SILENT_S ? "" : `silent ${span(silentS)}`;
 }

@@ -112,6 +112,11 @@ export class AgentPanel {
       "What is left of the route that it follows",
     );
     facts.set("stamp", time(live.stamp_ns), exact(live.stamp_ns));
+    facts.set(
+      "heard",
+      heard(agent),
+      "When the service received its latest message; a session ends when the robot says so",
+    );
     facts.set("lag", `${count(live.lag_samples)} samples`, "Received and not yet on disk");
     facts.set("travelled", detail === null ? null : metres(detail.travelled_m), "In this session");
     const evidence = detail?.evidence;
@@ -125,6 +130,17 @@ export class AgentPanel {
     this.touch.update(agent, memory, palette);
     this.grid.draw(colour, ink, module);
   }
+}
+
+function heard(agent: Agent): string {
+  const silentS = agent.silentS(performance.now());
+  const ago =
+    silentS === null
+      ? "not since the service started"
+      : silentS < 2
+        ? "just now"
+        : `${span(silentS)} ago`;
+  return agent.live.session_ended ? `${ago}, session ended` : ago;
 }
 
 function routeLeft({ length_m, steps_left, duration_s }: FollowedSummary): string {

@@ -7,6 +7,8 @@ import { rgb, type Palette } from "./palette";
 
 /** About so many cells lie along the longer side. */
 const CELLS = 10;
+/** A map that is lower than this part of its radius is flat. */
+const FLAT = 0.02;
 
 export interface Mark {
   at: Vec3;
@@ -18,6 +20,14 @@ export interface Mark {
 interface Extent {
   x: [number, number];
   y: [number, number];
+}
+
+/** Height of the floor [m]: that of a flat map, so that what is clicked on is what is drawn; else
+ * somewhat below the map. */
+function heightUnder({ min, max, radius }: Bounds, step: number): number {
+  const isFlat = max[2] - min[2] < FLAT * radius;
+  const rounded = step / (isFlat ? 100 : 4);
+  return Math.floor((isFlat ? min[2] : min[2] - 0.04 * radius) / rounded) * rounded;
 }
 
 export class Floor {
@@ -39,8 +49,7 @@ export class Floor {
     const low = (axis: 0 | 1): number => Math.floor(bounds.min[axis] / step - 0.5) * step;
     const high = (axis: 0 | 1): number => Math.ceil(bounds.max[axis] / step + 0.5) * step;
     const [x0, x1, y0, y1] = [low(0), high(0), low(1), high(1)];
-    const z = bounds.min[2] - 0.04 * bounds.radius;
-    const floor = Math.floor(z / (step / 4)) * (step / 4);
+    const floor = heightUnder(bounds, step);
     const asked = [x0, x1, y0, y1, floor, step, palette.shade].join();
     if (asked === this.drawn) {
       return;

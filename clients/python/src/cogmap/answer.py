@@ -150,6 +150,11 @@ class AgentSummary:
     name: str
     #: Its latest estimate; absent before its first motion, sighting or start pose.
     estimate: Optional[Estimate] = None
+    #: Whether the latest sample of its session ended it.
+    session_ended: bool = False
+    #: How long ago the service received a message of it [s]; `None` before the first one since the
+    #: service started, and from a node that follows the space.
+    heard_ago_s: Optional[float] = None
 
 
 @dataclass(frozen=True)
@@ -179,6 +184,11 @@ class AgentDetail:
     #: Sightings of its own earlier samples that were dropped, because those were not remembered, or
     #: no longer; over all sessions.
     forgotten_matches: int
+    #: Whether the latest sample of its session ended it.
+    session_ended: bool = False
+    #: How long ago the service received a message of it [s]; `None` before the first one since the
+    #: service started, and from a node that follows the space.
+    heard_ago_s: Optional[float] = None
 
 
 @dataclass(frozen=True)

@@ -63,12 +63,15 @@ class Estimate(UncertainPoseReadings):
     #: on one machine.
     term: int = 0
 
-    def _frame_text(self) -> str:
-        return "" if self.frame == "map" else f", {self.frame}"
-
     def __str__(self) -> str:
         place = "" if self.place is None else f", place {self.place} ({self.confidence:.2f})"
+        # How sure it is in another frame says nothing of where it is in the map.
+        pose, frame = (
+            (self._uncertain_pose_text(), "")
+            if self.frame == "map"
+            else (self._pose_text(), f", {self.frame}")
+        )
         return (
-            f"{self.agent} {self.status.value} in {self.space}{self._frame_text()}: "
-            f"{self._uncertain_pose_text()}{place}, sample {self.seq}"
+            f"{self.agent} {self.status.value} in {self.space}{frame}: "
+            f"{pose}{place}, sample {self.seq}"
         )

@@ -41,6 +41,11 @@ class LiveAgent:
     lag_samples: int
     #: Contacts of the episode with an object that is under way; `None` where there is none.
     contacts: Optional[int] = None
+    #: Whether the latest sample of its session ended it.
+    session_ended: bool = False
+    #: How long before the tick the service received a message of it [s]; `None` before the first
+    #: one since the service started.
+    heard_ago_s: Optional[float] = None
 
 
 @dataclass(frozen=True)

@@ -100,8 +100,13 @@ impl LiveFollower {
                 Arc::ptr_eq(&told.readout, &readout) && told.lag_samples == lag_samples
             });
             if !is_same {
-                let (estimate, contacts) = (&readout.estimate, readout.contacts);
-                agents.push(LiveAgent::of(estimate, lag_samples, contacts));
+                agents.push(LiveAgent {
+                    lag_samples,
+                    contacts: readout.contacts,
+                    session_ended: readout.session_ended,
+                    heard_ago_s: view.heard_ago_s(),
+                    ..LiveAgent::of(&readout.estimate)
+                });
             }
             let told = Told {
                 readout,

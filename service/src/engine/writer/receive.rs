@@ -103,6 +103,7 @@ impl Writer {
             return Err(IngestError::TooManyAgents);
         };
         self.agents[slot].heard = now;
+        self.agents[slot].view.hear(now);
         let sequencer = &mut self.agents[slot].sequencer;
         match sequencer.order_of(batch.session) {
             SessionOrder::Current => {}

@@ -67,6 +67,7 @@ fn open_in(directory: &Path) -> Result<LocalJournal, StoreError> {
         files::create_directory(&directory.join(SPACES)).map_err(on_disk)?;
         record::write(directory, record::NEXT_SPACE, &0_u32.to_le_bytes())?;
         record::write(directory, record::FORMAT, &FORMAT_VERSION.to_le_bytes())?;
+        tracing::info!(directory = %directory.display(), "a new store");
     }
     tidy_up(directory)?;
     let logs = Arc::new(RwLock::new(BTreeMap::new()));

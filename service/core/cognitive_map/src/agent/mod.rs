@@ -31,6 +31,8 @@ pub struct Agent {
     pub(crate) membership: Membership,
     /// `None` before the first session.
     pub(crate) session: Option<u64>,
+    /// Whether its latest sample ended the session.
+    pub(crate) session_ended: bool,
     pub(crate) next_seq: u64,
     pub(crate) stamp_ns: Option<i64>,
     pub(crate) announced: Announced,
@@ -58,6 +60,7 @@ state_of_struct!(Agent {
     name,
     membership,
     session,
+    session_ended,
     next_seq,
     stamp_ns,
     announced,
@@ -81,6 +84,7 @@ impl Agent {
             name,
             membership: Membership::Enrolled,
             session: None,
+            session_ended: false,
             next_seq: 0,
             stamp_ns: None,
             announced: Announced::new(modules),
@@ -129,6 +133,11 @@ impl Agent {
     /// Current session; 0 before the first one.
     pub fn session(&self) -> u64 {
         self.session.unwrap_or(0)
+    }
+
+    /// Whether the session's latest sample said that it has ended.
+    pub fn session_ended(&self) -> bool {
+        self.session_ended
     }
 
     /// Every sample of the session below this number has been applied or skipped.

@@ -80,6 +80,7 @@ impl Fold<'_> {
         self.end_trip(TripEnd::SessionEnd);
         self.end_episode();
         let before = self.agent.session.replace(session);
+        self.agent.session_ended = false;
         self.agent.next_seq = 0;
         self.agent.stamp_ns = None;
         self.agent.still_since = None;
@@ -136,6 +137,7 @@ impl Fold<'_> {
         self.stamp_ns = sample.stamp_ns;
         let before = self.agent.stamp_ns.replace(sample.stamp_ns);
         self.agent.next_seq = seq + 1;
+        self.agent.session_ended = matches!(sample.body, SampleBody::SessionEnd);
         if before
             .is_some_and(|before| interval_s(before, sample.stamp_ns) > self.settings.trip_gap_s)
         {

@@ -65,8 +65,8 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// views themselves, and tried claims as often as at first. Version 33 matched views with the noise
 /// of rotations that is assumed, where nobody states it, and wrote no ranges of matches. Version 34
 /// did not know which robots are calibrated by views, version 35 looked for beacons with all of the
-/// assumed noise.
-const VERSION: u16 = 36;
+/// assumed noise, version 36 did not know which sessions have ended.
+const VERSION: u16 = 37;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;
