@@ -53,6 +53,11 @@ class Driver:
             samples.append(cogmap.Sample(START_NS + step * _STEP_NS, body))
         self._send(samples)
 
+    def end(self) -> None:
+        """Ends the session."""
+        stamp_ns = START_NS + self._seq * _STEP_NS
+        self._send([cogmap.Sample(stamp_ns, cogmap.SessionEnd())])
+
     def _send(self, samples: List[cogmap.Sample]) -> None:
         batch = cogmap.SampleBatch(1, self._seq, tuple(samples))
         self._service.client().post_samples(self._space, self.agent, batch)

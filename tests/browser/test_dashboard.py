@@ -195,6 +195,21 @@ def test_an_agent_that_is_lost_is_told_by_word_and_shape(service: Server, open_p
     eventually("the badge", lambda: page.text(".agent-panel .badge") == "lost")
 
 
+def test_an_agent_whose_session_has_ended_is_told(service: Server, open_page: Open) -> None:
+    ada = Driver(service, "ada")
+    ada.drive(STEPS)
+    page = open_page(service)
+    page.until("the agent", agents=1)
+    page.page.click("[data-agent=ada]")
+    eventually("when it was heard", lambda: "heard" in page.panel(".agent-panel"))
+    assert "ended" not in page.panel(".agent-panel")
+    assert "±" in page.text("[data-agent=ada]")
+    ada.end()
+    eventually("the word", lambda: "ended" in page.text("[data-agent=ada]"))
+    eventually("the panel", lambda: "session ended" in page.panel(".agent-panel"))
+    assert page.complaints == []
+
+
 def test_the_past_is_shown_and_left_again(service: Server, open_page: Open) -> None:
     ada = Driver(service, "ada")
     ada.drive(STEPS)

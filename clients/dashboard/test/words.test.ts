@@ -28,6 +28,16 @@ test("steps of a scale are round", () => {
   assert.deepEqual([0.9, 1, 1.1, 3, 7, 45].map(roundStep), [1, 1, 2, 5, 10, 50]);
 });
 
+test("one leg is a leg", () => {
+  const ended = (legs: number): string | null =>
+    inWords({
+      kind: "trip_ended",
+      fields: { legs, reason: "session_end" },
+    } as unknown as Parameters<typeof inWords>[0]);
+  assert.equal(ended(1), "ended a trip of 1 leg (session end)");
+  assert.equal(ended(12), "ended a trip of 12 legs (session end)");
+});
+
 test("samples that are not in the map are told with their numbers and why", () => {
   const words = (fields: { [field: string]: unknown }): string | null =>
     inWords({ kind: "samples_skipped", fields } as unknown as Parameters<typeof inWords>[0]);

@@ -81,6 +81,11 @@ def test_an_estimate_is_one_line() -> None:
     text = "ada uncertain in lab: x 1.000 y -2.000 z 0.500 m, yaw 1.200 rad, sd 3.000 m 0.100 rad"
     assert str(estimate()) == f"{text}, sample 12"
     assert str(estimate(place=4, confidence=0.75)) == f"{text}, place 4 (0.75), sample 12"
+    # How sure it is where it woke up says nothing of where it is in the map.
+    lost = str(estimate(frame="unplaced", status=cogmap.Status.LOST))
+    assert lost == (
+        "ada lost in lab, unplaced: x 1.000 y -2.000 z 0.500 m, yaw 1.200 rad, sample 12"
+    )
 
 
 @pytest.mark.parametrize("name", ["estimate_localized", "estimate_uncertain", "estimate_lost"])

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use cogmap_proto::{
-    Codec, Contact, ContactLevel, Level, Marker, ObjectLesson, Relation, Sample, SampleBatch,
-    SampleBody, Sighting, SkipReason, SpaceSettings, StartPose, Target, TouchNoise, Velocity,
+    AgentDetail, Codec, Contact, ContactLevel, Level, Marker, ObjectLesson, Relation, Sample,
+    SampleBatch, SampleBody, Sighting, SkipReason, SpaceSettings, StartPose, Target, TouchNoise,
+    Velocity,
 };
 use cognitive_map::CognitiveMap;
 use proptest::prelude::*;
@@ -328,11 +329,20 @@ fn the_json_of_an_agent_is_that_of_its_detail_before_and_after_its_first_sample(
         });
         let view = space.agent(AGENT).expect("the agent");
         for _ in 0..times {
-            let detail = serde_json::to_vec(&view.detail()).expect("plain data encodes");
+            let detail = serde_json::to_string(&view.detail()).expect("plain data encodes");
+            let json = String::from_utf8(view.detail_json()).expect("a text");
+            // What comes last is how long ago it was heard, which is less the first time.
+            let before = |text: &str| {
+                text.split_once("\"heard_ago_s\":")
+                    .map(|(one, _)| one.to_owned())
+            };
             assert_eq!(
-                String::from_utf8(view.detail_json()),
-                String::from_utf8(detail)
+                before(&json).expect("the last field"),
+                before(&detail).unwrap()
             );
+            let told: AgentDetail = serde_json::from_str(&json).expect("a detail");
+            assert!(told.heard_ago_s <= view.detail().heard_ago_s);
+            assert!(told.heard_ago_s.is_some());
         }
     }
     engine.shutdown();

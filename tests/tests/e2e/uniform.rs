@@ -2,6 +2,7 @@
 //! asks for it, and the end of a trip when a robot closes.
 
 use std::sync::mpsc::{Receiver, channel};
+use std::time::Instant;
 
 use cogmap_client::{Robot, RobotSettings};
 use cogmap_proto::{
@@ -244,6 +245,53 @@ fn a_robot_that_closes_ends_its_trip() {
     assert!(ended.contains(&(1, Some(TripEnd::SessionEnd))), "{ended:?}");
     // One that vanishes without a word ends its trip at its next session, or by a gap.
     assert!(ended.contains(&(2, None)), "{ended:?}");
+}
+
+#[test]
+fn an_agent_tells_whether_its_session_has_ended_and_when_it_was_heard() {
+    let mut server = Server::start(&[]);
+    let told = |server: &Server| {
+        let detail = server.api().agent("default", AGENT).unwrap();
+        let listed = server.api().agents("default").unwrap();
+        let listed = listed.iter().find(|listed| listed.name == AGENT).unwrap();
+        assert_eq!(listed.session_ended, detail.session_ended);
+        assert_eq!(listed.heard_ago_s.is_some(), detail.heard_ago_s.is_some());
+        (detail.session_ended, detail.heard_ago_s)
+    };
+    let robot = |server: &Server, session| {
+        let settings = RobotSettings {
+            session: Some(session),
+            ..RobotSettings::default()
+        };
+        let robot = Robot::builder("default", AGENT).endpoint(&server.endpoint());
+        robot.settings(settings).connect().unwrap()
+    };
+    let before = Instant::now();
+    let first = robot(&server, SESSION);
+    first.velocity([1.0, 0.0, 0.0], [0.0; 3], 0.1).unwrap();
+    first.flush(LONG).unwrap();
+    let (ended, heard_ago_s) = told(&server);
+    let spent_s = before.elapsed().as_secs_f64();
+    assert!(!ended);
+    assert!(
+        (0.0..=spent_s).contains(&heard_ago_s.unwrap()),
+        "{heard_ago_s:?} {spent_s}"
+    );
+    first.close(LONG).unwrap();
+    assert!(told(&server).0);
+    server.kill();
+    server.run();
+    assert_eq!(
+        told(&server),
+        (true, None),
+        "nobody was heard since the start"
+    );
+    // A new session has not ended.
+    let second = robot(&server, SESSION + 1);
+    second.velocity([1.0, 0.0, 0.0], [0.0; 3], 0.1).unwrap();
+    second.flush(LONG).unwrap();
+    let (ended, heard_ago_s) = told(&server);
+    assert!(!ended && heard_ago_s.is_some());
 }
 
 #[test]

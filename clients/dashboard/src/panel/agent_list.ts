@@ -83,18 +83,19 @@ export class AgentList {
     }
     const best = agent.touch?.identification?.objects[0];
     const touching = contacts === null ? "" : best === undefined ? "touching" : best.name;
-    const standing = [status === "localized" ? touching : status, presence(agent)];
-    say(row.note, standing.filter((word) => word !== "").join(" · "));
+    say(row.note, status === "localized" ? touching : status);
     row.note.className = `note ${status}`;
     // Where it woke up is sure in its own frame alone: that says nothing of the map.
-    say(row.sd, agent.isPlaced ? `±${deviation(agent.positionSdM)}` : "");
-    row.sd.title = "Standard deviation of the position, over all axes";
+    const sd = agent.isPlaced ? `±${deviation(agent.positionSdM)}` : "";
+    const absent = absence(agent);
+    say(row.sd, absent || sd);
+    row.sd.title = absent || "Standard deviation of the position, over all axes";
     row.element.title = agent.isPlaced ? "" : "Not in the map yet: it is not drawn";
   }
 }
 
 /** Whether its session has ended, or for how long nothing has come of it. */
-function presence(agent: Agent): string {
+function absence(agent: Agent): string {
   if (agent.live.session_ended) {
     return "ended";
   }

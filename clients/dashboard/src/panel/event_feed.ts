@@ -4,7 +4,7 @@ import type { Memory, ShownEvent } from "../memory/memory";
 import { agentColour, type Palette } from "../scene/palette";
 import type { Vec3 } from "../wire";
 import { h } from "./dom";
-import { exact, metres, percent, time } from "./format";
+import { exact, metres, percent, some, time } from "./format";
 
 /** Lines that stay. */
 const LINES_MAX = 60;
@@ -27,7 +27,7 @@ export function inWords({ kind, fields }: ShownEvent): string | null {
       if (fields["reason"] === "full") {
         return null; // The next one continues it.
       }
-      return `ended a trip of ${text("legs")} legs (${text("reason").replace("_", " ")})`;
+      return `ended a trip of ${some(Number(fields["legs"]), "leg")} (${text("reason").replace("_", " ")})`;
     case "landmark_learned":
       return `learned the landmark ${text("landmark")}`;
     case "marker_passed":
@@ -41,7 +41,7 @@ export function inWords({ kind, fields }: ShownEvent): string | null {
     case "object_unknown":
       return "touches something unknown";
     case "object_learned":
-      return `learned ${text("object")} by ${text("contacts")} contacts`;
+      return `learned ${text("object")} by ${some(Number(fields["contacts"]), "contact")}`;
     case "object_not_learned":
       return "could not tell how to learn what it touched";
     case "objects_merged":

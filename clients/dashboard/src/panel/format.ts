@@ -9,6 +9,11 @@ export function count(n: number): string {
   return n >= 100_000 ? `${whole.format(n / 1000)} k` : whole.format(n);
 }
 
+/** So many things, by their name. */
+export function some(n: number, thing: string): string {
+  return `${count(n)} ${thing}${n === 1 ? "" : "s"}`;
+}
+
 /** A length with as many digits as mean something [m]. */
 export function metres(m: number): string {
   const size = Math.abs(m);

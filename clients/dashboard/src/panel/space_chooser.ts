@@ -6,13 +6,24 @@ import { h } from "./dom";
 export class SpaceChooser {
   readonly element: HTMLSelectElement;
   private names = "";
+  private isByPointer = false;
 
   constructor(choose: (space: string) => void) {
     this.element = h("select", {
       class: "space",
       title: "Space",
       attributes: { "aria-label": "space" },
-      on: { change: () => choose(this.element.value) },
+      on: {
+        // Whoever chose with the pointer has the keys of the page again; who uses keys goes on.
+        pointerdown: () => (this.isByPointer = true),
+        keydown: () => (this.isByPointer = false),
+        change: () => {
+          if (this.isByPointer) {
+            this.element.blur();
+          }
+          choose(this.element.value);
+        },
+      },
     });
   }
 

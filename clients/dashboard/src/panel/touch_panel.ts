@@ -64,7 +64,10 @@ export class TouchPanel {
         ? []
         : [
             ...said.objects.slice(0, BARS_MAX),
-            { name: "none of these", probability: said.unknown },
+            {
+              name: said.objects.length === 0 ? "something unknown" : "none of these",
+              probability: said.unknown,
+            },
           ];
     while (this.bars.childElementCount > rows.length) {
       this.bars.lastElementChild!.remove();

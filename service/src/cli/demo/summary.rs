@@ -218,7 +218,8 @@ impl Summary {
         for object in &self.objects {
             output::line(&format!("{:<12} {}", "touch", object.text()))?;
         }
-        output::line("error [m]    dead reckoning   cogmap   at the end: dead reckoning   cogmap")?;
+        output::line("error [m], root mean square over the drive and at its end")?;
+        output::line("             dead reckoning   cogmap   at the end: dead reckoning   cogmap")?;
         for robot in &self.robots {
             output::line(&format!(
                 "  {:<10} {:>14} {:>8} {:>27} {:>8}",

@@ -7,8 +7,8 @@ use crate::engine::trajectory::{Recorder, note_all};
 
 const INTERVAL_NS: i64 = 5_000_000;
 
-/// Folds motions of these durations \[ns\], and gives all rows with the newest pose. The recorder is
-/// stored and read again after each.
+/// Folds motions of these durations \[ns\], and gives all rows with the newest pose. The recorder
+/// is stored and read again after each.
 fn rows_of(durations_ns: &[i64]) -> (Vec<StampedPose>, StampedPose) {
     let mut map = CognitiveMap::new(core_settings(&SpaceSettings::default()).expect("valid"));
     let (mut recorders, mut rows, mut events) = (Vec::new(), Vec::new(), Vec::new());

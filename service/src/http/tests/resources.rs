@@ -297,14 +297,13 @@ async fn exports_hold_everything() {
     assert_eq!(export["space"], rig.get("/v1/spaces/lab").await.good());
     let places = rig.get("/v1/spaces/lab/places?limit=1000").await.good();
     assert_eq!(export["places"], places["places"]);
-    assert_eq!(
-        export["trips"][0],
-        rig.get("/v1/spaces/lab/trips/0").await.good()
-    );
-    assert_eq!(
-        export["agents"],
-        rig.get("/v1/spaces/lab/agents").await.good()["agents"]
-    );
+    let trip = rig.get("/v1/spaces/lab/trips/0").await.good();
+    assert_eq!(export["trips"][0], trip);
+    let mut agents = rig.get("/v1/spaces/lab/agents").await.good()["agents"].take();
+    for agent in agents.as_array_mut().expect("a list") {
+        agent["heard_ago_s"] = Value::Null; // that is of the moment
+    }
+    assert_eq!(export["agents"], agents);
     // One chain of places.
     let ways = export["ways"].as_array().expect("ways");
     assert_eq!(
