@@ -89,7 +89,11 @@ def test_agents_and_their_way(client: cogmap.Client) -> None:
     assert detail.estimate.translation_m == pytest.approx(where(STEPS), abs=EXACT)
     chord_m = 2 * math.sin(math.pi / STEPS)
     assert detail.travelled_m == pytest.approx(STEPS * chord_m, abs=EXACT)
-    assert list(client.agents("default")) == [cogmap.AgentSummary(AGENT, detail.estimate)]
+    assert detail.heard_ago_s is not None and detail.heard_ago_s >= 0
+    [listed] = client.agents("default")
+    assert (listed.name, listed.estimate) == (AGENT, detail.estimate)
+    assert not listed.session_ended and not detail.session_ended
+    assert listed.heard_ago_s is not None and listed.heard_ago_s >= detail.heard_ago_s
     way = client.trajectory("default", AGENT)
     assert (way.session, way.frame, way.kind) == (SESSION, "map", "causal")
     assert [pose.stamp_ns for pose in way.poses] == [
