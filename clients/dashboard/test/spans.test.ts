@@ -27,6 +27,19 @@ test("another clock does not stretch the span that is shown", () => {
   assert.equal(spans.end, -20_000 * DAY + 20, "and stays until the other one does");
 });
 
+test("a clock that leaps leaves the span that is shown", () => {
+  const spans = new Spans();
+  spans.hear(0, 0);
+  for (let leap = 1; leap <= 100; leap += 1) {
+    spans.hear(DAY * leap, 100 * leap);
+    spans.hear(leap, 100 * leap);
+  }
+  assert.deepEqual([spans.begin, spans.end], [0, 100]);
+  // The first leaps are forgotten: one between two of them has nothing to join.
+  spans.hear(DAY + 1000, 30_000);
+  assert.deepEqual([spans.begin, spans.end], [DAY + 1000, DAY + 1000]);
+});
+
 test("what comes between two spans joins them", () => {
   const spans = new Spans();
   spans.note(0);

@@ -6,6 +6,8 @@
 const GAP_S = 3600;
 /** The span that is shown stays until nothing was heard in it for so long [ms]. */
 const QUIET_MS = 10_000;
+/** Spans that are kept: a clock that leaps makes a new one each time. */
+const SPANS_MAX = 16;
 
 interface Span {
   begin: number;
@@ -66,6 +68,12 @@ export class Spans {
       if (other === this.shown) {
         this.shown = span;
       }
+    }
+    if (apart.length >= SPANS_MAX) {
+      apart.splice(
+        apart.findIndex((other) => other !== this.shown),
+        1,
+      );
     }
     this.spans = [...apart, span];
     return span;
