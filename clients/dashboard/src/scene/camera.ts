@@ -36,6 +36,9 @@ interface Flight {
   targetTo: Vector3;
 }
 
+/** Part of the distance to the target below which the eye has not moved. */
+const ROUNDING = 1e-9;
+
 export class Eye {
   readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.05, 5000);
   readonly controls: OrbitControls;
@@ -147,7 +150,13 @@ export class Eye {
     this.camera.near = Math.max(0.01, distance / 500);
     this.camera.far = distance * 20 + 100;
     this.camera.updateProjectionMatrix();
-    return this.controls.update() || moved;
+    const before = this.camera.position.clone();
+    const isTurned = this.controls.update();
+    // The controls compute the position anew each time: without this its rounding adds up.
+    if (before.distanceTo(this.camera.position) < ROUNDING * distance) {
+      this.camera.position.copy(before);
+    }
+    return isTurned || moved;
   }
 
   private fly(eye: Vector3, target: Vector3, nowMs: number, isSudden: boolean): void {
