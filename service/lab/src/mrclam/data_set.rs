@@ -75,6 +75,11 @@ impl Mrclam {
         &self.robots
     }
 
+    /// The same, to be changed.
+    pub(super) fn robots_mut(&mut self) -> &mut BTreeMap<u32, RobotLog> {
+        &mut self.robots
+    }
+
     /// Surveyed positions of the landmarks by subject number \[m\]. For scoring only: a map that is
     /// given them has nothing left to learn.
     pub fn landmarks(&self) -> &BTreeMap<u32, [f64; 2]> {

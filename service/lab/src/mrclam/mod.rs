@@ -15,6 +15,7 @@
 
 mod data_set;
 mod error;
+mod false_names;
 mod robot;
 mod stream;
 mod table;

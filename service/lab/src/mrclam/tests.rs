@@ -251,6 +251,42 @@ fn a_command_of_many_hours_is_split() {
 }
 
 #[test]
+fn a_share_of_the_sightings_has_another_name() {
+    let mut files = files();
+    let landmark = |n: u32| format!("{} 72.0 {n} 0.1\n", 10.0 + f64::from(n) * 1e-3);
+    let rows: String = (1..1900).map(landmark).collect();
+    files
+        .get_mut("Robot1_Measurement.dat")
+        .unwrap()
+        .push_str(&rows);
+    let set = read(&files).unwrap();
+    let confused = |share, seed| {
+        let mut confused = set.clone();
+        confused.confuse(share, seed);
+        confused
+    };
+    assert_eq!(confused(0.0, 1), set);
+    assert_eq!(confused(0.3, 1), confused(0.3, 1));
+    assert_ne!(confused(0.3, 1), confused(0.3, 2));
+    let mut n_false = 0;
+    for (robot, log) in confused(0.3, 1).robots() {
+        let right = &set.robots()[robot].measurements;
+        assert_eq!(log.measurements.len(), right.len());
+        for (seen, right) in log.measurements.iter().zip(right) {
+            if seen == right {
+                continue;
+            }
+            n_false += 1;
+            assert!(seen.subject != *robot, "nobody sees itself");
+            assert!([1, 2, 3, 6].contains(&seen.subject), "one that is seen");
+            let subject = right.subject;
+            assert_eq!(Measurement { subject, ..*seen }, *right);
+        }
+    }
+    assert!((480..660).contains(&n_false), "{n_false} of 1907");
+}
+
+#[test]
 fn a_robot_may_have_names_of_its_own_for_landmarks() {
     let set = read(&files()).unwrap();
     let mut n_renamed = 0;

@@ -9,7 +9,7 @@ use cogmap_proto::Sample;
 use cogmap_worlds::{ReadingBody, ReadingTarget, dead_reckoned, robot_name};
 use trajectory::Alignment;
 
-use super::arguments::ReplayArgs;
+use super::arguments::{ReplayArgs, share};
 use super::case::Case;
 use super::scoring::{Pairing, Scoring};
 use super::team::{Known, Team};
@@ -28,13 +28,22 @@ pub(in crate::cli) struct MrclamArgs {
     /// by geometry, and by what robots see of one another.
     #[arg(long, value_name = "N,N", value_delimiter = ',')]
     anonymous: Vec<u32>,
+    /// Give this share of the sightings another name, at random, as if a barcode had been misread.
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    false_names: Option<f64>,
+    /// Seed of which ones.
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    false_names_seed: u64,
     #[command(flatten)]
     replay: ReplayArgs,
 }
 
 pub(super) fn run(args: &MrclamArgs) -> anyhow::Result<()> {
-    let set = Mrclam::load(&args.directory)
+    let mut set = Mrclam::load(&args.directory)
         .with_context(|| format!("read {}", args.directory.display()))?;
+    if let Some(share) = args.false_names {
+        set.confuse(share, args.false_names_seed);
+    }
     for robot in &args.anonymous {
         anyhow::ensure!(
             set.robots().contains_key(robot),
