@@ -17,8 +17,9 @@ pub(super) struct AgentState {
     pub(super) range_sensor: RangeSensor,
     /// The landmarks of which it knows distances alone.
     pub(super) ranging: Ranging,
-    /// Sightings refused one after the other since it was put somewhere or widened last. The
-    /// published [`Evidence::refused_in_a_row`] is this number as of its latest sighting.
+    /// Sightings refused one after the other since it was put somewhere or widened last, without
+    /// those of unconfirmed landmarks until it is doubted for long. The published
+    /// [`Evidence::refused_in_a_row`] is this number as of its latest sighting.
     pub(super) refused: u32,
     /// How much its recent sightings contradict the estimate (see `set_aside`).
     pub(super) doubt: u32,

@@ -12,6 +12,7 @@ use super::calibration::{LASTING_DIM, VEER};
 use super::covariance::JointCovariance;
 use super::jacobian::Block;
 use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
+use super::landmark_evidence::LandmarkEvidence;
 use super::observers::Observers;
 use super::odometry_noise::Told;
 use super::parameters::Parameters;
@@ -44,8 +45,7 @@ pub(super) struct LandmarkState {
     pub(super) offset: usize,
     /// The sighting of the frame that saw it last.
     pub(super) used: u64,
-    /// Its sightings refused one after the other.
-    pub(super) refused: u32,
+    pub(super) evidence: LandmarkEvidence,
     /// Who has seen it.
     pub(super) observers: Observers,
 }

@@ -151,6 +151,7 @@ impl Frame {
                 .transform::<3>(landmark.offset, &rotation, &turned);
             landmark.position = alignment.pose * landmark.position;
             landmark.used = self.sightings;
+            landmark.evidence.rival = None; // its position was one of the other frame
             landmark.number = self.numbered;
             self.numbered += 1;
             match landmarks.entry(label) {
@@ -209,12 +210,19 @@ impl Frame {
         let innovation = other.position - one.position;
         let projection = self.covariance.project(&blocks);
         let mut variance = SMatrix::<f64, 3, 1>::repeat(SAME_LANDMARK_VARIANCE_M2);
+        let mut agree = true;
         for k in 0..3 {
             let expected = projection.spread[(k, k)] + variance[k];
             let square = innovation[k] * innovation[k] / expected;
             // A contradiction counts little: the points do not agree, or the label is not one
             // landmark's.
-            variance[k] += expected * (square / parameters.soft.powi(2) - 1.0).max(0.0);
+            let excess = square / parameters.soft.powi(2) - 1.0;
+            variance[k] += expected * excess.max(0.0);
+            agree &= excess <= 0.0;
+        }
+        if agree {
+            let label = label.clone();
+            self.confirm(&label);
         }
         let s = projection.spread + Matrix3::from_diagonal(&variance);
         let all = self.covariance.all();

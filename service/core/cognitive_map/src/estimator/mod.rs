@@ -23,7 +23,7 @@
 //!   agent that comes back counts for a ninth of what it knew.
 //! - **Doubt.** Components far from what is expected lose weight, sightings farther off are
 //!   refused; an agent whose sightings are refused again and again searches farther around, and a
-//!   landmark that only contradicts is forgotten.
+//!   landmark is forgotten that refused sightings agree to see elsewhere (`landmark_evidence`).
 //! - **Noise.** That of each agent's sensor is learned, upwards from what it states, by the map and
 //!   by how its sightings repeat (`understated_noise`); that of its odometry, from pairs of
 //!   sightings (`odometry_noise`); what was assumed of it too much before is taken back
@@ -57,7 +57,10 @@ mod jacobian;
 mod joint;
 mod landmark_archive;
 mod landmark_association;
+mod landmark_evidence;
+mod landmark_initialisation;
 mod landmark_sighting;
+mod landmark_votes;
 mod level;
 mod measurement_update;
 mod merging;

@@ -17,8 +17,10 @@
 //! g_i = s_i q_i / V      J ← J + w κ g gᵀ      ln s ← ln s + J⁻¹ w g (min(ν²/V, c²) − κ₀)
 //! ```
 //!
-//! Errors of sensors that last cancel out in a pair. The bound c keeps false sightings from
-//! counting for more than others; κ₀ and κ make that right for Gaussian noise.
+//! Errors of sensors that last cancel out in a pair. The bound c keeps single large errors from
+//! counting for more than others; κ₀ and κ make that right for Gaussian noise. A pair that is
+//! farther off than [`NOISE_FALSE_SD`] says nothing: one of the two was of something else. It would
+//! count as c², and where a tenth of all sightings are false, the factors would grow for ever.
 //!
 //! A beacon that was found by its distances says how well the robot turned meanwhile
 //! ([`NoiseEvidence`]), which counts beside the pairs.
@@ -35,10 +37,10 @@ use super::calibration::LastingErrors;
 use super::noise_part::{NoiseEvidence, NoisePart};
 use super::sighting_pair::{Anchor, NoisyMotion, Residual};
 use super::tuning::{
-    NOISE_ANGLE_SD_MAX_RAD, NOISE_CAUTION, NOISE_LOG_SCALE_MAX, NOISE_LOG_STEP_MAX, NOISE_MEMORY,
-    NOISE_PAIR_NS_MAX, NOISE_PAIR_WEIGHT, NOISE_PAIRS_MAX, NOISE_PRIOR_SD, NOISE_ROBUST,
-    NOISE_SATURATED, NOISE_SHARE_MIN, NOISE_SUM_LENGTH_MAX_M, NOISE_SURELY_SD, NOISE_TARGETS_MAX,
-    NOISE_TRIAL_NS_MAX, NOISE_TRIAL_SD,
+    NOISE_ANGLE_SD_MAX_RAD, NOISE_CAUTION, NOISE_FALSE_SD, NOISE_LOG_SCALE_MAX, NOISE_LOG_STEP_MAX,
+    NOISE_MEMORY, NOISE_PAIR_NS_MAX, NOISE_PAIR_WEIGHT, NOISE_PAIRS_MAX, NOISE_PRIOR_SD,
+    NOISE_ROBUST, NOISE_SATURATED, NOISE_SHARE_MIN, NOISE_SUM_LENGTH_MAX_M, NOISE_SURELY_SD,
+    NOISE_TARGETS_MAX, NOISE_TRIAL_NS_MAX, NOISE_TRIAL_SD,
 };
 use super::understated_noise::UnderstatedNoise;
 use crate::input::{Label, Relation};
@@ -304,12 +306,13 @@ impl OdometryNoise {
         let is_linear = |residual: &Residual| {
             !residual.is_angle || self.expected(residual) <= NOISE_ANGLE_SD_MAX_RAD.powi(2)
         };
-        if !is_doubted && residuals.iter().all(is_linear) {
+        let is_false = residuals.iter().any(|residual| self.is_false(residual));
+        if !is_doubted && !is_false && residuals.iter().all(is_linear) {
             for residual in &residuals {
                 self.learn(residual);
             }
         }
-        if is_saturated || seen >= NOISE_PAIRS_MAX {
+        if is_false || is_saturated || seen >= NOISE_PAIRS_MAX {
             self.anchors.remove(index);
             let anchor = Anchor::new(label, stamp_ns, relation, &self.motion);
             self.anchors.extend(anchor);
@@ -324,6 +327,11 @@ impl OdometryNoise {
     /// Variance of a residual, as learned.
     fn expected(&self, residual: &Residual) -> f64 {
         self.weighed(residual).sum() + residual.rest
+    }
+
+    /// Whether one of a pair must have been of something else.
+    fn is_false(&self, residual: &Residual) -> bool {
+        residual.square > NOISE_FALSE_SD * NOISE_FALSE_SD * self.expected(residual)
     }
 
     /// Whether the motion makes most of a residual, so that a longer one would not say more.

@@ -86,9 +86,10 @@ impl Frame {
         let scope = CorrectionScope {
             corrected: self.corrected_by(measurement.observer),
             counts: true,
+            is_confirmed: landmark.evidence.is_confirmed,
         };
         let outcome = self.update_by_range(measurement, range, &target, &scope);
-        self.weigh_landmark(measurement.observer, label, outcome.verdict);
+        self.weigh_ranged_landmark(measurement.observer, label, outcome.verdict);
         self.widen_if_refused(measurement.observer);
         outcome
     }
@@ -116,7 +117,11 @@ impl Frame {
             ],
             seen: SightingTarget::Agent(self.members[target].agent.into()),
         };
-        let scope = CorrectionScope { corrected, counts };
+        let scope = CorrectionScope {
+            corrected,
+            counts,
+            is_confirmed: true,
+        };
         let outcome = self.update_by_range(measurement, range, &target, &scope);
         self.widen_if_refused(measurement.observer);
         outcome
@@ -141,7 +146,10 @@ impl Frame {
             self.learn_turn_noise(measurement, point.turn_noise);
             self.make_room();
             let noise = point.covariance * RANGE_JOIN_WIDENING;
-            self.learn_landmark(measurement, label, &point.position, &noise)
+            let verdict = self.learn_landmark(measurement, label, &point.position, &noise);
+            // Many distances have found it.
+            self.confirm(label);
+            verdict
         });
         if verdict != Verdict::Pending {
             let observer = self.members[measurement.observer].state_mut();
@@ -236,7 +244,7 @@ impl Frame {
     }
 
     /// Notes for or against a landmark what became of a distance to it.
-    fn weigh_landmark(&mut self, observer: usize, label: &Label, verdict: Verdict) {
+    fn weigh_ranged_landmark(&mut self, observer: usize, label: &Label, verdict: Verdict) {
         let sightings = self.sightings;
         let member = &self.members[observer];
         let (agent, refused) = (member.agent, member.state.refused);
@@ -251,16 +259,16 @@ impl Frame {
         if is_doubted {
             return; // who is doubted speaks neither against a landmark nor for it
         }
-        landmark.refused = match verdict {
-            Verdict::Refused | Verdict::Reflected => landmark.refused + 1,
-            _ => 0,
-        };
+        match verdict {
+            Verdict::Refused | Verdict::Reflected => landmark.evidence.refused_ranges += 1,
+            _ => landmark.evidence.refused_ranges = 0,
+        }
         // Of an agent that contradicts everything, the landmark is not to blame.
         let most = match verdict {
             Verdict::Reflected => RANGES_TOO_LONG_MAX,
             _ => REFUSED_TO_FORGET,
         };
-        if landmark.refused >= most && refused < REFUSED_TO_WIDEN / 2 {
+        if landmark.evidence.refused_ranges >= most && refused < REFUSED_TO_WIDEN / 2 {
             self.forget(label);
         }
     }

@@ -24,7 +24,8 @@ use super::frame::{Frame, LandmarkState};
 use super::joint::{Estimator, MAP};
 use super::observers::Observers;
 use super::tuning::{
-    DOUBT_BY_OUTLIER, DOUBT_BY_SIGHTING, DOUBT_MAX, DOUBT_MIN, DOUBT_ON_RETURN, POSITION_SD_MAX_M,
+    DOUBT_BY_OUTLIER, DOUBT_BY_SIGHTING, DOUBT_MAX, DOUBT_MIN, DOUBT_ON_RETURN, DOUBT_TO_SEARCH,
+    POSITION_SD_MAX_M,
 };
 use crate::input::Label;
 use geometry::is_somewhere;
@@ -35,14 +36,16 @@ impl AgentState {
         self.doubt >= DOUBT_MIN
     }
 
-    /// A sighting was refused, or taken in; `fits` says whether all of its components
-    /// are about where they were expected.
-    pub(super) fn weigh(&mut self, is_refused: bool, fits: bool) {
-        if is_refused {
-            self.refused += 1;
-            self.doubt = (self.doubt + DOUBT_BY_SIGHTING).min(DOUBT_MAX);
-            return;
-        }
+    /// A sighting was refused; `is_confirmed` says whether its target is known to be where it was
+    /// expected.
+    pub(super) fn refuse(&mut self, is_confirmed: bool) {
+        self.refused += u32::from(is_confirmed || self.doubt >= DOUBT_TO_SEARCH);
+        self.doubt = (self.doubt + DOUBT_BY_SIGHTING).min(DOUBT_MAX);
+    }
+
+    /// A sighting was taken in; `fits` says whether all of its components are about where they were
+    /// expected.
+    pub(super) fn accept(&mut self, fits: bool) {
         self.refused = 0;
         self.doubt = if fits {
             self.doubt.saturating_sub(DOUBT_BY_SIGHTING)

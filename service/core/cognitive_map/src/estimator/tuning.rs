@@ -135,6 +135,10 @@ pub(super) const NOISE_PAIR_WEIGHT: f64 = 0.25;
 /// φ and the distribution Φ, 2Φ(c) − 1 − 2cφ(c) for the latter, and 2c²(1 − Φ(c)) more for the
 /// mean.
 pub(super) const NOISE_ROBUST: (f64, f64, f64) = (2.0, 0.920_54, 0.738_54);
+/// Deviations from which on one of a pair was of something else. More than c, so that noise that is
+/// far greater than thought shows in the pairs in between. Source: *hall*, with three of ten
+/// sightings of something else; with 5 what is learned of odometry at times does not come back.
+pub(super) const NOISE_FALSE_SD: f64 = 4.0;
 /// Pairs over which the past fades.
 pub(super) const NOISE_MEMORY: f64 = 500.0;
 /// Largest step of the logarithm of a factor.
@@ -298,9 +302,16 @@ pub(super) const RANGE_CORRELATION_MAX: f64 = 0.98;
 pub(super) const REFUSED_TO_WIDEN: u32 = 8;
 /// Deviations that are added to the pose then \[m, rad\]. Source: *hall*.
 pub(super) const WIDENED_SD: (f64, f64) = (1.0, 0.5);
-/// Refused sightings in a row after which a landmark is forgotten: it was moved or was never there.
+/// Votes after which a landmark is forgotten: refused sightings that see it at one other position,
+/// less those that see it elsewhere. Refused distances, which name no position, count in a row.
 /// Source: *hall*, a post that is moved.
 pub(super) const REFUSED_TO_FORGET: u32 = 8;
+/// The same for a landmark that no sighting has confirmed. Source: two against the one that placed
+/// it.
+pub(super) const VOTES_AGAINST_UNCONFIRMED: u32 = 2;
+/// Deviations of the distance of two sighted positions within which they agree. Source: the gate of
+/// sightings.
+pub(super) const VOTE_GATE: f64 = 4.0;
 /// Refused sightings in a row after which a label is that of a landmark of its own again. Source:
 /// less than [`REFUSED_TO_FORGET`], so that the landmark itself stays.
 pub(super) const REFUSED_TO_DISSOCIATE: u32 = 6;
@@ -319,6 +330,9 @@ pub(super) const DOUBT_MIN: u32 = DOUBT_BY_SIGHTING * REFUSED_TO_WIDEN;
 /// Doubt at which an agent is set aside. Source: an agent that slipped or was carried off a few
 /// metres has found its way back before, by searching farther around eight times; *liars*.
 pub(super) const DOUBT_MAX: u32 = DOUBT_BY_SIGHTING * 64;
+/// Doubt from which on an agent searches around by sightings of unconfirmed landmarks, too. Source:
+/// half of what sets it aside, so that it has time to.
+pub(super) const DOUBT_TO_SEARCH: u32 = DOUBT_MAX / 2;
 /// Doubt of an agent that was set aside and is back in the map: half as many sightings have to fit,
 /// more than do not, before it counts as others do.
 pub(super) const DOUBT_ON_RETURN: u32 = 2 * DOUBT_MIN;

@@ -19,6 +19,7 @@ use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member};
 use super::frame_match::FrameMatch;
 use super::joint::Estimator;
 use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
+use super::landmark_evidence::{LandmarkEvidence, Rival};
 use super::noise_part::NoisePart;
 use super::noise_share::NoiseShare;
 use super::observers::Observers;
@@ -204,12 +205,22 @@ state_of_struct!(Observers {
     agents as SortedUpTo<OBSERVERS_MAX>,
     are_more
 });
+state_of_struct!(Rival {
+    position,
+    covariance,
+    votes
+});
+state_of_struct!(LandmarkEvidence {
+    is_confirmed,
+    refused_ranges,
+    rival
+});
 state_of_struct!(LandmarkState {
     number,
     position,
     offset as UpTo<DIM_MAX>,
     used,
-    refused,
+    evidence,
     observers
 });
 state_of_struct!(Frame {
