@@ -20,7 +20,7 @@ use super::tuning::VOTE_GATE;
 /// Where refused sightings see a landmark.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Rival {
-    /// Where the one of those that agree sees it that knows it best, in the frame.
+    /// Position in the frame, by the most certain of the sightings that agree.
     pub(super) position: Point3<f64>,
     pub(super) covariance: Matrix3<f64>,
     /// Sightings that agree, less those that do not.
@@ -53,7 +53,7 @@ pub(super) struct LandmarkEvidence {
     pub(super) is_confirmed: bool,
     /// Distances refused one after the other.
     pub(super) refused_ranges: u32,
-    /// Where most of the sightings see it that were refused since one fitted.
+    /// Another position, for which sightings vote that were refused since one fitted.
     pub(super) rival: Option<Rival>,
 }
 
