@@ -41,8 +41,8 @@ struct Run {
     map: CognitiveMap,
     agents: BTreeMap<String, (AgentId, u64, Status)>,
     next: u32,
-    /// The robot that does not know where it is, since when, and whether that was noticed.
-    lost: Option<(String, f64, bool)>,
+    /// The robot that does not know where it is, and since when.
+    lost: Option<(String, f64)>,
     touched: Option<(f64, u64)>,
     told: Vec<String>,
 }
@@ -83,11 +83,11 @@ impl Run {
                 }
             }
             Act::WokenUp { robot } => {
-                self.lost = Some((robot.clone(), now_s, true));
+                self.lost = Some((robot.clone(), now_s));
                 self.told.push("woken up".to_owned());
             }
             Act::CarriedOff { robot, .. } => {
-                self.lost = Some((robot.clone(), now_s, false));
+                self.lost = Some((robot.clone(), now_s));
                 self.told.push("carried off".to_owned());
             }
             Act::Touching(thing) => {
@@ -138,13 +138,17 @@ impl Run {
         }
         let status = self.map.status(agent).expect("it was enrolled");
         self.agents.insert(name.clone(), (agent, seq, status));
-        if status != before {
-            self.status(tick, agent, status, now_s);
-        }
+        self.status(tick, agent, [before, status], now_s);
     }
 
-    fn status(&mut self, tick: &AgentTick, agent: AgentId, status: Status, now_s: f64) {
-        let Some((robot, since_s, is_noticed)) = &mut self.lost else {
+    fn status(
+        &mut self,
+        tick: &AgentTick,
+        agent: AgentId,
+        [before, status]: [Status; 2],
+        now_s: f64,
+    ) {
+        let Some((robot, since_s)) = &self.lost else {
             return;
         };
         if *robot != tick.name {
@@ -154,18 +158,16 @@ impl Run {
         let error_m = (pose.translation.vector - tick.truth.pose.translation.vector).norm();
         let after_s = now_s - *since_s;
         match status {
-            Status::Uncertain | Status::Lost => {
-                *is_noticed = true;
-                self.told.push(format!("{status:?} {after_s:.1}"));
-            }
-            Status::Localized if *is_noticed => {
+            // Who is carried off may be found by the very sightings that tell so.
+            Status::Localized if error_m < 0.5 => {
                 self.told
                     .push(format!("found {after_s:.1}, {error_m:.2} off"));
-                if error_m < 0.5 {
-                    self.lost = None;
-                }
+                self.lost = None;
             }
-            Status::Localized => {}
+            _ if status != before => self
+                .told
+                .push(format!("{status:?} {after_s:.1}, {error_m:.2} off")),
+            _ => {}
         }
     }
 }

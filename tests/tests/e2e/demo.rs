@@ -41,7 +41,7 @@ fn the_demo_loses_robots_and_finds_them_and_recognises_a_cup() {
     assert!(number(carried, "carried_m") > 3.9, "{carried}");
     // The order of things is that of their causes, and the end is the truth.
     assert!(number(carried, "noticed_s") >= number(carried, "at_s"));
-    assert!(number(carried, "found_s") > number(carried, "noticed_s"));
+    assert!(number(carried, "found_s") >= number(carried, "noticed_s"));
     for search in [woken, carried] {
         assert!(
             number(search, "found_s") > number(search, "at_s"),

@@ -114,7 +114,12 @@ impl Story {
                     format!("{robot} is lost: it may be anywhere, and the service looks for it")
                 }
             }
-            Status::Localized if search.noticed_s.is_some() && error_m <= FALSE_M => {
+            // Who is carried off may be found by the very sightings that tell so.
+            Status::Localized
+                if error_m <= FALSE_M
+                    && (search.noticed_s.is_some() || search.cause == Cause::Carried) =>
+            {
+                search.noticed_s.get_or_insert(at_s);
                 search.found_s = Some(at_s);
                 search.error_m = Some(error_m);
                 let again = match search.cause {
@@ -273,6 +278,29 @@ mod tests {
         assert_eq!(
             [search.noticed_s, search.lost_s, search.found_s],
             [Some(42.0), Some(43.0), Some(47.0)]
+        );
+    }
+
+    #[test]
+    fn who_is_found_at_once_was_noticed_then() {
+        let mut story = story();
+        let carried = Act::CarriedOff {
+            robot: "robot5".to_owned(),
+            from_m: Vector3::new(1.0, 1.0, 1.0),
+        };
+        story.act(
+            &carried,
+            45 * SECOND_NS,
+            Some(Vector3::new(14.0, 14.0, 14.0)),
+        );
+        assert_eq!(story.estimate(&told(Status::Localized, 40), 22.5), None);
+        let found = story.estimate(&told(Status::Localized, 41), 0.1);
+        assert!(found.is_some_and(|line| line.contains("found again, 0.10 m")));
+        let (searches, _) = story.end();
+        let search = &searches[0];
+        assert_eq!(
+            [search.noticed_s, search.lost_s, search.found_s],
+            [Some(41.0), None, Some(41.0)]
         );
     }
 

@@ -66,7 +66,7 @@ pub(super) struct SearchRecord {
     pub(super) at_s: f64,
     /// How far it was carried.
     pub(super) carried_m: Option<f64>,
-    /// When the service first called it uncertain or lost.
+    /// When the service first called it uncertain or lost, or else found it.
     pub(super) noticed_s: Option<f64>,
     /// When the service called it lost.
     pub(super) lost_s: Option<f64>,

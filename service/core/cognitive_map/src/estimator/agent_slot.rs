@@ -6,6 +6,7 @@ use super::agent_filter::AgentFilter;
 use super::outcome::Evidence;
 use super::range_sensor::RangeSensor;
 use super::ranging::Ranging;
+use super::recent_sightings::RecentSightings;
 use super::sensor::Sensor;
 use super::tuning::RETURN_WIDENING;
 
@@ -17,8 +18,11 @@ pub(super) struct AgentState {
     pub(super) range_sensor: RangeSensor,
     /// The landmarks of which it knows distances alone.
     pub(super) ranging: Ranging,
+    /// Where it saw known landmarks lately.
+    pub(super) recent: RecentSightings,
     /// Sightings refused one after the other since it was put somewhere or widened last, without
-    /// those of unconfirmed landmarks until it is doubted for long. The published
+    /// those of unconfirmed landmarks until it is doubted for long; some, too, after its sightings
+    /// have put it elsewhere. The published
     /// [`Evidence::refused_in_a_row`] is this number as of its latest sighting.
     pub(super) refused: u32,
     /// How much its recent sightings contradict the estimate (see `set_aside`).
@@ -69,6 +73,7 @@ impl AgentSlot {
                 sensor: Sensor::default(),
                 range_sensor: RangeSensor::default(),
                 ranging: Ranging::default(),
+                recent: RecentSightings::default(),
                 refused: 0,
                 doubt: 0,
                 too_long: 0,

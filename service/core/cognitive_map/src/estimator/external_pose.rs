@@ -15,7 +15,7 @@ use super::parameters::Parameters;
 use super::tuning::{
     INTERSECTION_GAIN_MAX, INTERSECTION_GAIN_MIN, INTERSECTION_STEPS, INTERSECTION_VARIANCE_MIN,
 };
-use geometry::{PoseCovariance, is_somewhere, se3, symmetric};
+use geometry::{OUT_OF_PLANE, PoseCovariance, is_somewhere, se3, symmetric};
 
 /// What another estimate says of an agent.
 #[derive(Clone, Copy, Debug)]
@@ -196,6 +196,31 @@ impl Frame {
         let offset = member.offset;
         self.covariance.isolate(offset, &covariance.diagonal());
         self.covariance.set_diagonal(offset, &symmetric(covariance));
+        self.tell_members();
+    }
+
+    /// Puts a member somewhere else, as unsure as that makes its own pose. Nobody else moves.
+    pub(super) fn move_unsure(&mut self, index: usize, pose: &Isometry3<f64>) {
+        self.flush();
+        let member = &mut self.members[index];
+        let moved = member.filter().pose.inv_mul(pose);
+        let is_planar = member.filter().is_planar;
+        member.state_mut().filter.pose = *pose;
+        let offset = member.offset;
+        let own: Matrix6<f64> = self.covariance.block(offset, offset);
+        // Errors that it shares with the map go with that: they are the same about other axes.
+        let turned = se3::adjoint(&moved.inverse());
+        let own = symmetric(&(turned * own * turned.transpose()));
+        // How far it was off says nothing of the axis.
+        let off_m2 = moved.translation.vector.norm_squared();
+        let off_rad2 = moved.rotation.angle().powi(2);
+        let missing = Vector6::from_fn(|k, _| match k {
+            _ if is_planar && OUT_OF_PLANE.contains(&k) => 0.0,
+            0..3 => off_m2,
+            _ => off_rad2,
+        });
+        let own = own + Matrix6::from_diagonal(&missing);
+        self.covariance.transform(offset, &turned, &own);
         self.tell_members();
     }
 

@@ -71,6 +71,11 @@ impl Member {
         self.offset..self.offset + BODY_DIM
     }
 
+    /// Those of its pose.
+    pub(super) fn pose_components(&self) -> Range<usize> {
+        self.offset..self.offset + 6
+    }
+
     /// Its body.
     pub(super) fn filter(&self) -> &AgentFilter {
         &self.state.filter

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector};
+use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector3};
 
 use super::agent_slot::AgentState;
 use super::covariance::Projection;
@@ -11,7 +11,7 @@ use super::innovation::{PointInnovation, pose_innovation};
 use super::jacobian::Block;
 use super::parameters::Parameters;
 use super::sensor::SightingTarget;
-use super::tuning::{ODD_SD, REFUSED_TO_WIDEN, WIDENED_SD};
+use super::tuning::ODD_SD;
 use super::verdict::{Outcome, Verdict};
 use crate::input::{Label, Relation, RelativePose};
 use geometry::{beside, se3, seen_by_pose};
@@ -44,17 +44,8 @@ impl Frame {
         let Some(innovation) = PointInnovation::new(measurement.relation, &expected) else {
             return Outcome::nothing();
         };
-        let to_body = past
-            .pose
-            .rotation
-            .to_rotation_matrix()
-            .into_inner()
-            .transpose();
         let innovation = self.as_sensed(measurement, innovation);
-        let blocks = [
-            past.block(&(innovation.by_point * seen_by_pose(&expected))),
-            point_block(landmark.offset, &(innovation.by_point * to_body)),
-        ];
+        let blocks = past.landmark_blocks(&expected, landmark.offset, &innovation);
         let seen = SightingTarget::Landmark(landmark.number);
         let scope = CorrectionScope {
             corrected: self.corrected_by(measurement.observer),
@@ -63,7 +54,8 @@ impl Frame {
         };
         let outcome = self.update_by_point(measurement, &blocks, &innovation, seen, &scope);
         self.weigh_landmark(measurement, label, outcome.verdict);
-        self.widen_if_refused(measurement.observer);
+        self.note_sighting(measurement, label, outcome.verdict);
+        self.doubt_pose(measurement, outcome.verdict);
         outcome
     }
 
@@ -211,14 +203,6 @@ impl Frame {
             self.correct(measurement.observer, &correction, measurement.parameters);
         }
     }
-
-    /// Lets an agent whose sightings contradict the estimate search farther around.
-    pub(super) fn widen_if_refused(&mut self, observer: usize) {
-        if self.members[observer].state.refused >= REFUSED_TO_WIDEN {
-            self.members[observer].state_mut().refused = 0;
-            self.widen(observer, WIDENED_SD.0, WIDENED_SD.1);
-        }
-    }
 }
 
 /// What a sighting may do.
@@ -273,6 +257,21 @@ impl PastPose {
             by_now: se3::adjoint(back),
             offset: member.offset,
         }
+    }
+
+    /// What an innovation of a landmark says of its position and of the pose.
+    pub(super) fn landmark_blocks(
+        &self,
+        expected: &Vector3<f64>,
+        offset: usize,
+        innovation: &PointInnovation,
+    ) -> [Block<3>; 2] {
+        let to_body = self.pose.rotation.inverse().to_rotation_matrix();
+        let by_landmark = innovation.by_point * to_body.into_inner();
+        [
+            self.block(&(innovation.by_point * seen_by_pose(expected))),
+            point_block(offset, &by_landmark),
+        ]
     }
 
     pub(super) fn block<const M: usize>(&self, jacobian: &SMatrix<f64, M, 6>) -> Block<M> {

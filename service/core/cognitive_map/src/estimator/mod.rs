@@ -22,8 +22,9 @@
 //! - **Dropped correlations.** A landmark that comes back is fused by covariance intersection; an
 //!   agent that comes back counts for a ninth of what it knew.
 //! - **Doubt.** Components far from what is expected lose weight, sightings farther off are
-//!   refused; an agent whose sightings are refused again and again searches farther around, and a
-//!   landmark is forgotten that refused sightings agree to see elsewhere (`landmark_evidence`).
+//!   refused; an agent whose sightings are refused again and again is put where what it saw lately
+//!   agrees that it is (`relocation`), or searches farther around, and a landmark is forgotten that
+//!   refused sightings agree to see elsewhere (`landmark_evidence`).
 //! - **Noise.** That of each agent's sensor is learned, upwards from what it states, by the map and
 //!   by how its sightings repeat (`understated_noise`); that of its odometry, from pairs of
 //!   sightings (`odometry_noise`); what was assumed of it too much before is taken back
@@ -42,6 +43,7 @@ mod associations;
 mod assumed_noise;
 mod bias_measurement;
 mod calibration;
+mod consensus;
 mod covariance;
 mod doubtful_motion;
 mod effect;
@@ -79,7 +81,9 @@ mod range_places;
 mod range_sensor;
 mod range_update;
 mod ranging;
+mod recent_sightings;
 mod registration;
+mod relocation;
 mod removal;
 mod sensor;
 mod set_aside;

@@ -34,7 +34,10 @@ impl Estimator {
             return Step::none();
         };
         let AgentState {
-            filter, ranging, ..
+            filter,
+            ranging,
+            recent,
+            ..
         } = state;
         let duration_s = filter.history.stamp_ns().map_or(0.0, |before| {
             let interval_s = stamp_ns.saturating_sub(before) as f64 * 1e-9;
@@ -42,6 +45,7 @@ impl Estimator {
         });
         let step = filter.step(motion, duration_s, &self.parameters);
         ranging.go(&step);
+        recent.go(&step);
         filter.history.advance(stamp_ns, motion.increment());
         effects.push(Effect::Moved { agent, step });
         if filter.is_nowhere() {

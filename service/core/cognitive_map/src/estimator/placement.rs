@@ -10,6 +10,7 @@ use super::agent_slot::{AgentState, Detached};
 use super::effect::Effect;
 use super::frame_alignment::FrameAlignment;
 use super::joint::{Estimator, MAP};
+use super::recent_sightings::RecentSightings;
 use super::standing::Standing;
 use super::tuning::ANY_TURN_SD_RAD;
 use crate::input::StartPose;
@@ -122,6 +123,7 @@ impl Estimator {
             state.filter.noise.forget_anchors();
             state.filter.standing = Standing::default();
             state.ranging.clear();
+            state.recent = RecentSightings::default();
             let covariance = state.filter.covariance_mut();
             for k in 0..6 {
                 covariance[(k, k)] += sd[k] * sd[k];
@@ -159,6 +161,8 @@ impl Estimator {
             // Who was doubted stays so until what it sees fits.
             doubt,
             too_long: 0,
+            // What it saw before was seen from elsewhere.
+            recent: RecentSightings::default(),
             ..state
         };
         let slot = self.slot_mut(agent);

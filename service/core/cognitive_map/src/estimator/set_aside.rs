@@ -23,6 +23,7 @@ use super::effect::Effect;
 use super::frame::{Frame, LandmarkState};
 use super::joint::{Estimator, MAP};
 use super::observers::Observers;
+use super::recent_sightings::RecentSightings;
 use super::tuning::{
     DOUBT_BY_OUTLIER, DOUBT_BY_SIGHTING, DOUBT_MAX, DOUBT_MIN, DOUBT_ON_RETURN, DOUBT_TO_SEARCH,
     POSITION_SD_MAX_M,
@@ -199,6 +200,7 @@ impl Estimator {
             range_sensor: state.range_sensor,
             // All that they know is relative to the agent.
             ranging: state.ranging,
+            recent: RecentSightings::default(),
             refused: 0,
             doubt: 0,
             too_long: 0,

@@ -297,8 +297,9 @@ pub(super) const RANGE_CORRELATION_MAX: f64 = 0.98;
 
 // --- Outliers and contradictions -----------------------------------------------------------------
 
-/// Refused sightings in a row after which an agent's pose becomes less certain. Source: *hall*, an
-/// agent that slipped finds its way back.
+/// Refused sightings in a row after which an agent's pose becomes less certain, where what it saw
+/// lately agrees on none that is farther off. Source: *hall*, an agent that slipped finds its way
+/// back.
 pub(super) const REFUSED_TO_WIDEN: u32 = 8;
 /// Deviations that are added to the pose then \[m, rad\]. Source: *hall*.
 pub(super) const WIDENED_SD: (f64, f64) = (1.0, 0.5);
@@ -336,6 +337,27 @@ pub(super) const DOUBT_TO_SEARCH: u32 = DOUBT_MAX / 2;
 /// Doubt of an agent that was set aside and is back in the map: half as many sightings have to fit,
 /// more than do not, before it counts as others do.
 pub(super) const DOUBT_ON_RETURN: u32 = 2 * DOUBT_MIN;
+
+/// Refused sightings in a row from which on it is asked whether what an agent saw agrees on another
+/// pose; of a doubted agent, one. Source: *hall*, with three of ten sightings of something else.
+pub(super) const REFUSED_TO_DOUBT_POSE: u32 = 3;
+/// Sightings of known landmarks that an agent keeps, to judge its pose by. Source: work, which
+/// grows with their square, in space with their cube.
+pub(super) const RECENT_SIGHTINGS_MAX: usize = 16;
+/// Log₁₀ of the expected number of poses on which as many agree by chance, for one to count.
+/// Source: one in a thousand.
+pub(super) const CONSENSUS_LOG10_FALSE_ALARMS_MAX: f64 = -3.0;
+/// Landmarks whose sightings must agree on a pose. Source: more than the three posts of a shelf
+/// that is moved.
+pub(super) const CONSENSUS_MIN: usize = 4;
+/// Latest sightings of which one must agree on a pose. Source: as many as are refused in a row
+/// before anything is asked.
+pub(super) const CONSENSUS_LATEST: u64 = 3;
+/// Least distance of two sightings that say how a body is turned, in its own deviations. Source: a
+/// turn known to within a fifth of a radian.
+pub(super) const CONSENSUS_SPAN_SD: f64 = 5.0;
+/// Rounds of fitting a pose and seeking what agrees on it again. Source: rounds of registration.
+pub(super) const CONSENSUS_ROUNDS: usize = 3;
 
 // --- Agents and landmarks that come back
 // -----------------------------------------------------------

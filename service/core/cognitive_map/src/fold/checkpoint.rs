@@ -66,8 +66,9 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// of rotations that is assumed, where nobody states it, and wrote no ranges of matches. Version 34
 /// did not know which robots are calibrated by views, version 35 looked for beacons with all of the
 /// assumed noise, version 36 did not know which sessions have ended, version 37 learned the noise
-/// of odometry from false sightings, too, and forgot landmarks that were refused in a row.
-const VERSION: u16 = 38;
+/// of odometry from false sightings, too, and forgot landmarks that were refused in a row, version
+/// 38 did not know where robots saw landmarks lately.
+const VERSION: u16 = 39;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

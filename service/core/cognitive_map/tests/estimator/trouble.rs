@@ -173,6 +173,28 @@ fn a_robot_that_slipped_or_was_carried_away_comes_back() {
     }
 }
 
+/// Sightings of known landmarks that agree say where a robot is that was carried away.
+#[test]
+fn a_robot_that_was_carried_away_knows_where_it_is_within_seconds() {
+    for mistaken in [0.0, 0.1] {
+        let looks = |seed| {
+            let hall = Hall {
+                seed,
+                steps: 220,
+                mistaken,
+                slip: Some((150, planar(-2.5, 2.0, 2.5))),
+                ..Hall::default()
+            };
+            let errors_m = hall.run().errors_m;
+            let is_lost = |step: &usize| errors_m[*step][1] > 0.4;
+            (150..220).rev().find(is_lost).map_or(0, |last| last - 149)
+        };
+        let mut all: Vec<usize> = (1..13).map(looks).collect();
+        all.sort_unstable();
+        assert!(all[6] <= 5 && all[11] <= 15, "{mistaken}: {all:?}");
+    }
+}
+
 #[test]
 fn a_moved_landmark_is_found_where_it_stands() {
     let place = Point3::new(1.0, -1.0, 0.0);

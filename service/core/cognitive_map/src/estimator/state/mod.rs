@@ -3,10 +3,13 @@
 //! The parameters are constant and not written.
 
 mod codecs;
+mod square;
 
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
+
+use square::{read_square, write_square};
 
 use codecs::{ListUpTo, MapUpTo, Shared, SortedUpTo, UpTo};
 
@@ -31,6 +34,7 @@ use super::range_hypotheses::RangeHypotheses;
 use super::range_places::PointHypothesis;
 use super::range_sensor::RangeSensor;
 use super::ranging::Ranging;
+use super::recent_sightings::{RecentSighting, RecentSightings};
 use super::sensor::{Sensor, SightingTarget};
 use super::sighting_pair::{Anchor, NoisyMotion};
 use super::sightings::{CrossFrameSighting, PendingSighting};
@@ -38,7 +42,7 @@ use super::standing::{Read, Standing};
 use super::tuning::{
     ARCHIVE_PART_MAX, ARCHIVE_PARTS, ASSOCIATIONS_MAX, CROSS_SIGHTINGS_MAX, FRAME_MATCHES_MAX,
     HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, NOISE_SHARES_MAX, NOISE_TARGETS_MAX, OBSERVERS_MAX,
-    PENDING_MAX, RANGE_POINTS_MAX, RANGED_MAX, SENSOR_TARGETS_MAX,
+    PENDING_MAX, RANGE_POINTS_MAX, RANGED_MAX, RECENT_SIGHTINGS_MAX, SENSOR_TARGETS_MAX,
 };
 use super::understated_noise::UnderstatedNoise;
 use ::state::{
@@ -160,11 +164,27 @@ state_of_struct!(RangeSensor {
     square,
     latest as MapUpTo<SENSOR_TARGETS_MAX>
 });
+state_of_struct!(RecentSighting {
+    label,
+    point,
+    distance_m,
+    variance,
+    noise,
+    number,
+    is_refused
+});
+state_of_struct!(RecentSightings {
+    seen as ListUpTo<RECENT_SIGHTINGS_MAX>,
+    way,
+    noise,
+    count
+});
 state_of_struct!(AgentState {
     filter,
     sensor,
     range_sensor,
     ranging,
+    recent,
     refused,
     doubt,
     too_long
@@ -298,44 +318,6 @@ impl State for JointCovariance {
             });
         }
         Ok(joint)
-    }
-}
-
-/// Whether a matrix is the same to the last bit with rows for columns.
-fn is_symmetric(dim: usize, entries: &[f64]) -> bool {
-    let mirror = |at: usize| entries[at % dim * dim + at / dim];
-    (0..entries.len()).all(|at| entries[at].to_bits() == mirror(at).to_bits())
-}
-
-/// One half of a symmetric matrix, unless rounding made the halves differ.
-fn write_square(dim: usize, entries: &[f64], out: &mut StateWriter) {
-    let is_symmetric = is_symmetric(dim, entries);
-    is_symmetric.write(out);
-    for row in 0..dim {
-        let first = if is_symmetric { row } else { 0 };
-        for entry in &entries[row * dim + first..(row + 1) * dim] {
-            entry.write(out);
-        }
-    }
-}
-
-fn read_square(dim: usize, input: &mut StateReader<'_>) -> Result<Vec<f64>, CorruptState> {
-    let is_half = bool::read(input)?;
-    let mut entries = vec![0.0; dim * dim];
-    for row in 0..dim {
-        let first = if is_half { row } else { 0 };
-        for column in first..dim {
-            let entry = f64::read(input)?;
-            entries[row * dim + column] = entry;
-            if is_half {
-                entries[column * dim + row] = entry;
-            }
-        }
-    }
-    if is_half == is_symmetric(dim, &entries) {
-        Ok(entries)
-    } else {
-        Err(CorruptState::Invalid)
     }
 }
 
