@@ -118,7 +118,8 @@ pub struct Evidence {
     /// Sightings refused, as too far from what the map says.
     pub refused: u64,
     /// Of those, how many one after the other up to now, without those of landmarks that no second
-    /// sighting has confirmed; from 4 on the agent is not `localized`.
+    /// sighting has confirmed, or 4 when they have put the agent elsewhere; from 4 on it is not
+    /// `localized`.
     pub refused_in_a_row: u64,
     /// Mean of the squared error of the accepted ones' components, each over what was expected of
     /// it: 1 where the stated noise is honest, more where it is too small. Absent before the first

@@ -12,7 +12,8 @@ pub struct Evidence {
     pub accepted: u64,
     /// Sightings refused.
     pub refused: u64,
-    /// Of those, how many one after the other up to now, without those of unconfirmed landmarks.
+    /// Of those, how many one after the other up to now, without those of unconfirmed landmarks;
+    /// some, too, when they have put the agent elsewhere.
     pub refused_in_a_row: u32,
     /// Sum of the normalised innovations squared of those taken in. It has the mean of `components`
     /// where the stated noise is honest.

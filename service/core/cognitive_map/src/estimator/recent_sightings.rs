@@ -50,7 +50,7 @@ pub(super) struct SeenPoint {
     /// Of the sighting along an axis \[m²\].
     pub(super) variance: f64,
     /// What the noise of the motion since then adds \[m²\].
-    pub(super) moved: f64,
+    pub(super) motion_variance: f64,
     /// Sightings since then.
     pub(super) age: u64,
     /// Whether it was refused.
@@ -130,7 +130,7 @@ impl RecentSightings {
                 in_body,
                 distance_m: seen.distance_m,
                 variance: seen.variance,
-                moved: along + about * in_body.coords.norm_squared(),
+                motion_variance: along + about * in_body.coords.norm_squared(),
                 age: self.count.saturating_sub(seen.number + 1),
                 is_refused: seen.is_refused,
             }
@@ -166,13 +166,13 @@ mod tests {
         let now = &recent.by_now()[0];
         // It was seen before the last quarter of a metre.
         assert!((now.in_body - Point3::new(1.75, 1.0, 0.5)).norm() < 1e-12);
-        assert!(now.moved == 0.0 && now.is_refused);
+        assert!(now.motion_variance == 0.0 && now.is_refused);
         let turned = Isometry3::new(Vector3::x(), Vector3::z() * std::f64::consts::FRAC_PI_2);
         recent.go(&step(turned));
         let now = &recent.by_now()[0];
         assert!((now.in_body - Point3::new(1.0, -0.75, 0.5)).norm() < 1e-12);
         let moved = 0.01 * (1.0 + now.in_body.coords.norm_squared());
-        assert!((now.moved - moved).abs() < 1e-12);
+        assert!((now.motion_variance - moved).abs() < 1e-12);
         assert!((now.distance_m - point.coords.norm()).abs() < 1e-12);
     }
 

@@ -79,7 +79,7 @@ impl Frame {
         let agreeing = &found.agreeing;
         for seen in agreeing {
             // What odometry was off by, all of them share.
-            let sd_m = (seen.variance + agreeing.len() as f64 * seen.moved).sqrt();
+            let sd_m = (seen.variance + agreeing.len() as f64 * seen.motion_variance).sqrt();
             let Ok(position) = RelativePosition::new(seen.in_body.coords.into(), [sd_m; 3]) else {
                 continue;
             };

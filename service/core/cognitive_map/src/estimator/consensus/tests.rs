@@ -41,7 +41,7 @@ impl Scene {
                 in_body,
                 distance_m: point.coords.norm().max(0.5),
                 variance: SD_M * SD_M,
-                moved: 0.0,
+                motion_variance: 0.0,
                 age: (n - 1 - k) as u64,
                 is_refused: true,
             });
