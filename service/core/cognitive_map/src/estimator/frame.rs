@@ -11,12 +11,12 @@ use super::agent_slot::AgentState;
 use super::calibration::{LASTING_DIM, VEER};
 use super::covariance::JointCovariance;
 use super::jacobian::Block;
-use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
+use super::landmark_archive::LandmarkArchive;
 use super::landmark_evidence::LandmarkEvidence;
 use super::observers::Observers;
 use super::odometry_noise::Told;
 use super::parameters::Parameters;
-use super::tuning::{ANY_TURN_SD_RAD, ANY_TURN_SLACK, LANDMARKS_MAX};
+use super::tuning::{ANY_TURN_SD_RAD, ANY_TURN_SLACK};
 use crate::input::Label;
 use geometry::{OUT_OF_PLANE, from_blocks, positive, se3};
 
@@ -45,6 +45,8 @@ pub(super) struct LandmarkState {
     pub(super) offset: usize,
     /// The sighting of the frame that saw it last.
     pub(super) used: u64,
+    /// Whether it stays in the joint estimate for those that leave it.
+    pub(super) is_anchor: bool,
     pub(super) evidence: LandmarkEvidence,
     /// Who has seen it.
     pub(super) observers: Observers,
@@ -170,29 +172,6 @@ impl Frame {
         self.landmarks
             .contains_key(label)
             .then(|| Arc::make_mut(&mut self.landmarks).remove(label))?
-    }
-
-    /// Makes room for one more landmark: those seen longest ago keep their own covariance only.
-    pub(super) fn make_room(&mut self) {
-        while self.landmarks.len() >= LANDMARKS_MAX {
-            let oldest = self
-                .landmarks
-                .iter()
-                .min_by_key(|(_, landmark)| landmark.used);
-            let Some(label) = oldest.map(|(label, _)| label.clone()) else {
-                return;
-            };
-            if let Some(landmark) = Arc::make_mut(&mut self.landmarks).remove(&label) {
-                let archived = ArchivedLandmark {
-                    position: landmark.position,
-                    covariance: self.landmark_covariance(&landmark),
-                    left: self.sightings,
-                    only: landmark.observers.only(),
-                };
-                self.drop_components(landmark.offset, LANDMARK_DIM);
-                self.archive.insert(label, archived);
-            }
-        }
     }
 
     /// Forgets that an agent saw landmarks, whose number will be another one's: it may have been

@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member};
 use super::frame_alignment::{FrameAlignment, PointPair, point_by_alignment, pose_by_alignment};
 use super::jacobian::Block;
-use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
+use super::landmark_archive::LandmarkArchive;
 use super::measurement_update::point_block;
 use super::parameters::Parameters;
 use super::tuning::SAME_LANDMARK_VARIANCE_M2;
@@ -20,17 +20,16 @@ impl Frame {
     /// The landmarks known in both frames.
     pub(super) fn shared(&self, newer: &Self) -> Vec<PointPair> {
         let pair = |(label, landmark): (&Label, &LandmarkState)| {
-            let other = newer.landmarks.get(label)?;
-            let spread = self.landmark_covariance(landmark).trace()
-                + newer.landmark_covariance(other).trace();
+            let (position, covariance) = self.known_landmark(label)?;
+            let spread = covariance.trace() + newer.landmark_covariance(landmark).trace();
             let variance = spread / 3.0 + SAME_LANDMARK_VARIANCE_M2;
             Some(PointPair {
-                older: landmark.position,
-                newer: other.position,
+                older: position,
+                newer: landmark.position,
                 variance,
             })
         };
-        self.landmarks.iter().filter_map(pair).collect()
+        newer.landmarks.iter().filter_map(pair).collect()
     }
 
     /// A landmark is called by another name, which is not known here.
@@ -76,6 +75,13 @@ impl Frame {
     ) {
         self.flush();
         newer.flush();
+        if parameters.is_some() {
+            for label in newer.landmarks.keys() {
+                self.restore(label);
+            }
+        }
+        let first_number = self.numbered;
+        self.numbered += newer.numbered;
         let start = self.covariance.grow(newer.covariance.dim());
         self.covariance.place(start, &newer.covariance);
         let tau = self.covariance.grow(6);
@@ -84,7 +90,7 @@ impl Frame {
         let newcomers = self.members.len();
         self.add_members(std::mem::take(&mut newer.members), alignment, start, tau);
         let landmarks = Arc::unwrap_or_clone(newer.landmarks);
-        let mut duplicates = self.add_landmarks(landmarks, alignment, start, tau);
+        let mut duplicates = self.add_landmarks(landmarks, alignment, [start, tau], first_number);
         for member in &mut self.members[newcomers..] {
             let own = self.covariance.block(member.offset, member.offset);
             *member.state_mut().filter.covariance_mut() = own;
@@ -100,7 +106,7 @@ impl Frame {
         for (_, duplicate) in duplicates {
             self.drop_components(duplicate.offset, LANDMARK_DIM);
         }
-        self.take_over(&newer.archive, alignment);
+        self.take_over(&newer.archive, alignment, first_number);
         self.population += newer.population;
         self.make_room();
     }
@@ -127,13 +133,14 @@ impl Frame {
         }
     }
 
-    /// Adds the landmarks of a newer frame likewise; answers those that are known here.
+    /// Adds the landmarks of a newer frame likewise, numbered from `first_number` on; answers those
+    /// that are known here.
     fn add_landmarks(
         &mut self,
         added: BTreeMap<Label, LandmarkState>,
         alignment: &FrameAlignment,
-        start: usize,
-        tau: usize,
+        [start, tau]: [usize; 2],
+        first_number: u64,
     ) -> Vec<(Label, LandmarkState)> {
         let rotation = alignment.pose.rotation.to_rotation_matrix().into_inner();
         let mut duplicates = Vec::new();
@@ -152,8 +159,12 @@ impl Frame {
             landmark.position = alignment.pose * landmark.position;
             landmark.used = self.sightings;
             landmark.evidence.rival = None; // its position was one of the other frame
-            landmark.number = self.numbered;
-            self.numbered += 1;
+            landmark.number += first_number;
+            landmark.is_anchor = false;
+            if self.archive.contains(&label) {
+                duplicates.push((label, landmark));
+                continue;
+            }
             match landmarks.entry(label) {
                 Entry::Occupied(entry) => duplicates.push((entry.key().clone(), landmark)),
                 Entry::Vacant(entry) => {
@@ -164,24 +175,27 @@ impl Frame {
         duplicates
     }
 
-    /// Archives the archived landmarks of a newer frame here, unless they are known here.
-    fn take_over(&mut self, newer: &LandmarkArchive, alignment: &FrameAlignment) {
-        let rotation = alignment.pose.rotation.to_rotation_matrix().into_inner();
+    /// Archives the archived landmarks of a newer frame here, unless they are known here, numbered
+    /// from `first_number` on.
+    fn take_over(
+        &mut self,
+        newer: &LandmarkArchive,
+        alignment: &FrameAlignment,
+        first_number: u64,
+    ) {
         for (label, landmark) in newer.iter() {
             if self.landmarks.contains_key(label) || self.archive.contains(label) {
                 continue;
             }
-            let by_alignment: SMatrix<f64, 3, 6> = point_by_alignment(&landmark.position)
-                .fixed_view::<3, 6>(0, 0)
-                .into_owned();
-            let spread = landmark.covariance
-                + by_alignment * alignment.covariance * by_alignment.transpose();
-            let archived = ArchivedLandmark {
-                position: alignment.pose * landmark.position,
-                covariance: symmetric(&(rotation * spread * rotation.transpose())),
-                left: self.sightings,
-                only: landmark.only,
-            };
+            let mut archived = landmark.aligned(alignment);
+            archived.left = self.sightings;
+            archived.number += first_number;
+            for tie in &mut archived.ties {
+                // An anchor that is known here, too, is one with that.
+                let known = self.landmarks.get(&tie.anchor);
+                let known = known.filter(|anchor| anchor.number < first_number);
+                tie.number = known.map_or(tie.number + first_number, |anchor| anchor.number);
+            }
             self.archive.insert(label.clone(), archived);
         }
     }

@@ -234,7 +234,7 @@ impl Estimator {
 
 impl Frame {
     /// Whether it has a landmark of a name.
-    fn has_name(&self, label: &Label) -> bool {
+    pub(super) fn has_name(&self, label: &Label) -> bool {
         self.landmarks.contains_key(label) || self.archive.contains(label)
     }
 

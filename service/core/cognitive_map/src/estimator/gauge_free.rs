@@ -25,13 +25,7 @@ impl Frame {
         landmarks: &[&LandmarkState],
         is_planar: bool,
     ) -> Vec<f64> {
-        let along = |own: &Matrix3<f64>| {
-            if is_planar {
-                f64::midpoint(own[(0, 0)], own[(1, 1)])
-            } else {
-                own.trace() / 3.0
-            }
-        };
+        let along = |own: &Matrix3<f64>| variance_along(own, is_planar);
         let own: Vec<Matrix3<f64>> = landmarks
             .iter()
             .map(|landmark| self.landmark_covariance(landmark))
@@ -79,6 +73,15 @@ impl Frame {
             along(&rest).max(0.0)
         })
         .collect()
+    }
+}
+
+/// Variance of a point along an axis \[m²\], of a planar frame one in the plane.
+pub(super) fn variance_along(covariance: &Matrix3<f64>, is_planar: bool) -> f64 {
+    if is_planar {
+        f64::midpoint(covariance[(0, 0)], covariance[(1, 1)])
+    } else {
+        covariance.trace() / 3.0
     }
 }
 

@@ -3,23 +3,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Point3};
-
+use super::archived_landmark::ArchivedLandmark;
 use super::tuning::{ARCHIVE_PART_MAX, ARCHIVE_PARTS};
 use crate::input::Label;
 use ::state::PagedVec;
-
-/// A landmark that left the joint estimate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct ArchivedLandmark {
-    pub(super) position: Point3<f64>,
-    /// The covariance that it had. With what else it is correlated is not known any more.
-    pub(super) covariance: Matrix3<f64>,
-    /// The sighting of the frame at which it left.
-    pub(super) left: u64,
-    /// The one agent that had seen it until then, if there was one only.
-    pub(super) only: Option<u32>,
-}
 
 /// One part.
 pub(super) type Part = BTreeMap<Label, ArchivedLandmark>;
@@ -127,14 +114,21 @@ fn part_of(label: &Label) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Matrix3, Point3};
+
+    use super::super::landmark_evidence::LandmarkEvidence;
     use super::*;
 
     fn landmark(left: u64) -> ArchivedLandmark {
         ArchivedLandmark {
+            number: left,
             position: Point3::new(left as f64, 0.0, 0.0),
             covariance: Matrix3::identity(),
+            ties: Vec::new(),
+            rest: Matrix3::identity(),
             left,
             only: None,
+            evidence: LandmarkEvidence::default(),
         }
     }
 

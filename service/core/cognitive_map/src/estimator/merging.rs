@@ -35,8 +35,7 @@ impl Estimator {
         self.turn = (start + FRAMES_COMPARED_MAX) % count;
         for other in others {
             let frame = self.frame(other);
-            let knows =
-                |frame: &Frame| label.is_none_or(|label| frame.landmarks.contains_key(label));
+            let knows = |frame: &Frame| label.is_none_or(|label| frame.has_name(label));
             let is_empty = frame.population == 0 && frame.landmarks.is_empty();
             if other == own || is_empty || !knows(frame) {
                 continue;

@@ -19,8 +19,9 @@
 //!   which is bounded: at most 32 agents and 96 landmarks of a frame are held jointly. Agents that
 //!   neither see nor are seen go on by themselves, and further landmarks are archived, up to 65,536
 //!   a frame. A clone shares what it holds.
-//! - **Dropped correlations.** A landmark that comes back is fused by covariance intersection; an
-//!   agent that comes back counts for a ninth of what it knew.
+//! - **Dropped correlations.** A landmark that is archived stays tied to its nearest anchors, which
+//!   are held jointly (`landmark_anchors`); an agent that comes back counts for a ninth of what it
+//!   knew.
 //! - **Doubt.** Components far from what is expected lose weight, sightings farther off are
 //!   refused; an agent whose sightings are refused again and again is put where what it saw lately
 //!   agrees that it is (`relocation`), or searches farther around, and a landmark is forgotten that
@@ -39,6 +40,7 @@
 mod agent_filter;
 mod agent_sighting;
 mod agent_slot;
+mod archived_landmark;
 mod associations;
 mod assumed_noise;
 mod bias_measurement;
@@ -57,10 +59,12 @@ mod gauge_free;
 mod innovation;
 mod jacobian;
 mod joint;
+mod landmark_anchors;
 mod landmark_archive;
 mod landmark_association;
 mod landmark_evidence;
 mod landmark_initialisation;
+mod landmark_return;
 mod landmark_sighting;
 mod landmark_votes;
 mod level;

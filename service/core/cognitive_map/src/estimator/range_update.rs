@@ -6,7 +6,6 @@ use nalgebra::{Isometry3, Matrix3, Vector1, Vector3};
 
 use super::frame::Frame;
 use super::jacobian::Block;
-use super::landmark_archive::ArchivedLandmark;
 use super::measurement_update::{CorrectionScope, Measurement, PastPose, point_block};
 use super::noise_part::NoiseEvidence;
 use super::odometry_noise::Told;
@@ -14,8 +13,8 @@ use super::range_hypotheses::{ExpectedRange, RangeDensity, loss_of_weight};
 use super::range_places::OdometryKind;
 use super::sensor::SightingTarget;
 use super::tuning::{
-    ARCHIVE_WIDENING, RANGE_INFORMATION_MIN, RANGE_JOIN_WIDENING, RANGE_TOO_LONG_SQUARE,
-    RANGES_TOO_LONG_MAX, REFUSED_TO_FORGET, REFUSED_TO_WIDEN,
+    RANGE_INFORMATION_MIN, RANGE_JOIN_WIDENING, RANGE_TOO_LONG_SQUARE, RANGES_TOO_LONG_MAX,
+    REFUSED_TO_FORGET, REFUSED_TO_WIDEN,
 };
 use super::verdict::{Outcome, Verdict};
 use crate::input::{Label, Range};
@@ -55,23 +54,13 @@ impl Frame {
         label: &Label,
     ) -> Outcome {
         self.flush();
-        if !self.landmarks.contains_key(label)
-            && let Some(archived) = self.archive.remove(label)
-        {
-            self.make_room();
-            // What it is correlated with is not known any more: it counts for half.
-            let covariance = archived.covariance * ARCHIVE_WIDENING;
-            self.restore(
-                label,
-                &ArchivedLandmark {
-                    covariance,
-                    ..archived
-                },
-            );
-        }
         let past = PastPose::new(&self.members[measurement.observer], measurement.back);
         let Some(landmark) = self.landmarks.get(label) else {
-            return self.range_unknown_landmark(measurement, range, label);
+            let returned = self.update_by_archived(measurement.observer, label, |frame| {
+                frame.update_by_landmark_range(measurement, range, label)
+            });
+            return returned
+                .unwrap_or_else(|| self.range_unknown_landmark(measurement, range, label));
         };
         let expected = past.pose.inverse_transform_point(&landmark.position).coords;
         let turn = past.pose.rotation.to_rotation_matrix().into_inner();
@@ -146,10 +135,10 @@ impl Frame {
             self.learn_turn_noise(measurement, point.turn_noise);
             self.make_room();
             let noise = point.covariance * RANGE_JOIN_WIDENING;
-            let verdict = self.learn_landmark(measurement, label, &point.position, &noise);
+            self.learn_landmark(measurement, label, &point.position, &noise);
             // Many distances have found it.
             self.confirm(label);
-            verdict
+            Verdict::Learned
         });
         if verdict != Verdict::Pending {
             let observer = self.members[measurement.observer].state_mut();

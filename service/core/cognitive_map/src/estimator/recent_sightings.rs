@@ -120,6 +120,12 @@ impl RecentSightings {
         }
     }
 
+    /// Whether a landmark's latest sighting fits where the agent is.
+    pub(super) fn fits(&self, label: &Label) -> bool {
+        let latest = self.seen.iter().find(|seen| seen.label == *label);
+        latest.is_some_and(|seen| !seen.is_refused)
+    }
+
     /// They as they are by now, the oldest first.
     pub(super) fn by_now(&self) -> Vec<SeenPoint> {
         let by_now = |seen: &RecentSighting| {

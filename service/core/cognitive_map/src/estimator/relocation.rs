@@ -8,11 +8,12 @@ use nalgebra::Isometry3;
 
 use super::consensus::{Consensus, KnownPoint, consensus};
 use super::frame::{Frame, LandmarkState};
+use super::gauge_free::variance_along;
 use super::innovation::PointInnovation;
 use super::landmark_initialisation::SightedPoint;
 use super::measurement_update::{CorrectionScope, Measurement, PastPose};
 use super::recent_sightings::SeenPoint;
-use super::tuning::{REFUSED_TO_DOUBT_POSE, REFUSED_TO_WIDEN, WIDENED_SD};
+use super::tuning::{LANDMARKS_MAX, REFUSED_TO_DOUBT_POSE, REFUSED_TO_WIDEN, WIDENED_SD};
 use super::verdict::Verdict;
 use crate::input::{Label, Relation, RelativePosition};
 
@@ -28,11 +29,7 @@ impl Frame {
             return;
         };
         let state = self.members[measurement.observer].state_mut();
-        let variance = if state.filter.is_planar {
-            f64::midpoint(noise[(0, 0)], noise[(1, 1)])
-        } else {
-            noise.trace() / 3.0
-        };
+        let variance = variance_along(&noise, state.filter.is_planar);
         let is_refused = verdict == Verdict::Refused;
         let (point, back) = (point.into(), measurement.back);
         state.recent.push(label, &point, back, variance, is_refused);
@@ -78,6 +75,7 @@ impl Frame {
         self.move_unsure(observer, &found.pose);
         let agreeing = &found.agreeing;
         for seen in agreeing {
+            self.restore(&seen.label);
             // What odometry was off by, all of them share.
             let sd_m = (seen.variance + agreeing.len() as f64 * seen.motion_variance).sqrt();
             let Ok(position) = RelativePosition::new(seen.in_body.coords.into(), [sd_m; 3]) else {
@@ -90,6 +88,7 @@ impl Frame {
             };
             self.settle_by(&measurement, &seen.label);
         }
+        self.archive_oldest(LANDMARKS_MAX);
         let state = self.members[observer].state_mut();
         state.recent.fit(agreeing);
         state.refused = REFUSED_TO_WIDEN / 2;
@@ -123,10 +122,26 @@ impl Frame {
     }
 
     /// The landmarks of what was seen, if they are known.
+    ///
+    /// How far each is off beside the others says what they have in common, or, where some are
+    /// archived, what the anchors of each leave open.
     fn known_points(&self, seen: &[SeenPoint], is_planar: bool) -> Vec<Option<KnownPoint>> {
-        let known = seen.iter().map(|seen| self.landmarks.get(&seen.label));
-        let known: Vec<Option<&LandmarkState>> = known.collect();
-        let only: Vec<&LandmarkState> = known.iter().copied().flatten().collect();
+        let joint = seen.iter().map(|seen| self.landmarks.get(&seen.label));
+        let joint: Vec<Option<&LandmarkState>> = joint.collect();
+        let only: Vec<&LandmarkState> = joint.iter().copied().flatten().collect();
+        if seen.iter().any(|seen| self.archive.contains(&seen.label)) {
+            let by_anchors = |(joint, seen): (Option<&LandmarkState>, &SeenPoint)| {
+                let (position, rest) = if let Some(landmark) = joint {
+                    (landmark.position, self.ties(landmark).1)
+                } else {
+                    let archived = self.by_now(self.archive.get(&seen.label)?, 0);
+                    (archived.position, archived.rest)
+                };
+                let variance = variance_along(&rest, is_planar);
+                Some(KnownPoint { position, variance })
+            };
+            return joint.into_iter().zip(seen).map(by_anchors).collect();
+        }
         let mut variances = self.gauge_free_variances(&only, is_planar).into_iter();
         let point = |landmark: Option<&LandmarkState>| {
             Some(KnownPoint {
@@ -134,7 +149,7 @@ impl Frame {
                 variance: variances.next()?,
             })
         };
-        known.into_iter().map(point).collect()
+        joint.into_iter().map(point).collect()
     }
 }
 
@@ -222,6 +237,21 @@ mod tests {
         see(&mut estimator, other, &elsewhere(), seen);
         assert_eq!(refused(&estimator), 0);
         assert!(off_m(&estimator, other, &elsewhere()) < 0.1);
+    }
+
+    #[test]
+    fn archived_landmarks_tell_where_a_carried_agent_is() {
+        let (mut estimator, one, other) = two();
+        estimator.frame_mut(MAP).archive_oldest(0);
+        let seen = find(&mut estimator, other);
+        assert!((3..7).contains(&seen), "{seen}");
+        assert!(off_m(&estimator, one, &Isometry3::identity()) < 0.1);
+        let frame = estimator.frame(MAP);
+        assert_eq!(frame.landmarks.len() + frame.archive.len(), POSTS);
+        for number in 0..POSTS {
+            let (at, _) = frame.known_landmark(&label(number)).unwrap();
+            assert!((at - post(number)).norm() < 0.1, "{number}");
+        }
     }
 
     #[test]

@@ -16,6 +16,19 @@
 pub(super) const MEMBERS_MAX: usize = 32;
 /// Landmarks that a frame estimates jointly. Source: as [`MEMBERS_MAX`].
 pub(super) const LANDMARKS_MAX: usize = 96;
+/// Of them, those that stay for the others. Source: a judgement; a quarter.
+pub(super) const ANCHORS_MAX: usize = LANDMARKS_MAX / 4;
+/// Anchors of an archived landmark. Source: three points of a body tell how it moves in space.
+pub(super) const TIES_MAX: usize = 3;
+/// Most archived anchors of anchors that come back with a landmark, one after the other.
+pub(super) const TIED_DEPTH_MAX: u32 = 16;
+/// How near to one another, or to a line, anchors say little of how they have turned \[m\]. Source:
+/// the deviation of a landmark that is seen well.
+pub(super) const TURN_ARM_M: f64 = 0.02;
+/// Variances that are added to those of anchors, which may be known exactly: a share of each, and
+/// \[m²\]. Source: more than rounding, less than sensors tell.
+pub(super) const TIE_VARIANCE_SHARE: f64 = 1e-9;
+pub(super) const TIE_VARIANCE_MIN_M2: f64 = 1e-12;
 /// Parts of a landmark archive. A change after a snapshot copies one part.
 pub(super) const ARCHIVE_PARTS: usize = 1024;
 /// Landmarks of a part of an archive: 65,536 in all. Labels are spread evenly over the parts; of a
@@ -369,14 +382,6 @@ pub(super) const CONSENSUS_ROUNDS: usize = 3;
 /// and the others' variances would have to grow by an eighth each time. They stay as they are: what
 /// they miss is small, and a growth with every return would not end.
 pub(super) const RETURN_WIDENING: f64 = 3.0;
-/// Factor of the variances of an archived landmark whose distance alone is measured: the weight ½
-/// of covariance intersection.
-pub(super) const ARCHIVE_WIDENING: f64 = 2.0;
-/// Least variance and information of a component that an archived landmark gains \[m², 1/m²\].
-pub(super) const ARCHIVE_GAIN_MIN_M2: f64 = 1e-9;
-/// Normalised distance between an archived landmark and its new sighting from which on the archived
-/// estimate is dropped.
-pub(super) const ARCHIVE_GATE: f64 = 6.0;
 /// Steps of the search for the weight of a covariance intersection.
 pub(super) const INTERSECTION_STEPS: u32 = 16;
 /// Least information that a direction gains by an external pose, as a part of what is known of it.

@@ -67,8 +67,9 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// did not know which robots are calibrated by views, version 35 looked for beacons with all of the
 /// assumed noise, version 36 did not know which sessions have ended, version 37 learned the noise
 /// of odometry from false sightings, too, and forgot landmarks that were refused in a row, version
-/// 38 did not know where robots saw landmarks lately.
-const VERSION: u16 = 39;
+/// 38 did not know where robots saw landmarks lately, version 39 not what ties archived
+/// landmarks to others.
+const VERSION: u16 = 40;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

@@ -4,8 +4,6 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
 use random::Seeded;
 
-/// Half the hall's length and width \[m\].
-const HALF_M: f64 = 6.0;
 const ROBOTS: usize = 4;
 const STEP_S: f64 = 0.5;
 const SPEED_M_S: f64 = 0.4;
@@ -22,6 +20,10 @@ pub(crate) type Lie = fn(&mut Seeded, f64, f64) -> (f64, f64);
 pub(crate) struct Hall {
     pub(crate) seed: u64,
     pub(crate) steps: usize,
+    /// Half the hall's length and width \[m\].
+    pub(crate) half_m: f64,
+    /// Posts in it.
+    pub(crate) posts: usize,
     /// Deviations of sightings as they are stated, over the true ones.
     pub(crate) stated: f64,
     /// Robots that state them so; the others state the true ones.
@@ -58,6 +60,8 @@ impl Default for Hall {
         Self {
             seed: 1,
             steps: 400,
+            half_m: 6.0,
+            posts: 20,
             stated: 1.0,
             stated_by: 0..ROBOTS,
             mistaken: 0.0,
@@ -99,15 +103,15 @@ impl Hall {
     /// Lets the robots drive.
     pub(crate) fn run(&self) -> Outcome {
         let mut random = Seeded(self.seed);
-        let mut posts: Vec<Point3<f64>> = (0..20)
+        let mut posts: Vec<Point3<f64>> = (0..self.posts)
             .map(|_| {
-                let [x, y] = [(); 2].map(|()| (2.0 * random.uniform() - 1.0) * HALF_M);
+                let [x, y] = [(); 2].map(|()| (2.0 * random.uniform() - 1.0) * self.half_m);
                 Point3::new(x, y, 0.0)
             })
             .collect();
         let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
         let mut truth =
-            corners.map(|(x, y)| planar(0.5 * HALF_M * x, 0.5 * HALF_M * y, 3.0 * x + y));
+            corners.map(|(x, y)| planar(0.5 * self.half_m * x, 0.5 * self.half_m * y, 3.0 * x + y));
         let mut estimator = Estimator::new(Parameters::default());
         for pose in &truth {
             let agent = estimator.enrol();
@@ -129,7 +133,7 @@ impl Hall {
                     truth[robot] *= slip;
                 }
                 if !silent {
-                    let motion = drive(&mut truth[robot], &mut random, scales[robot]);
+                    let motion = drive(&mut truth[robot], self.half_m, &mut random, scales[robot]);
                     let motion = self.as_stated(&motion);
                     estimator.motion(number(robot), stamp_ns, &motion, &mut Vec::new());
                 }
@@ -259,10 +263,15 @@ impl Hall {
 }
 
 /// A step towards the middle of the hall, more or less; answers what odometry reads.
-fn drive(truth: &mut Isometry3<f64>, random: &mut Seeded, (scale, bias): (f64, f64)) -> Motion {
+fn drive(
+    truth: &mut Isometry3<f64>,
+    half_m: f64,
+    random: &mut Seeded,
+    (scale, bias): (f64, f64),
+) -> Motion {
     let here = truth.translation.vector;
     let inwards = truth.inverse_transform_point(&Point3::origin()).coords;
-    let pull = if here.norm() > 0.7 * HALF_M {
+    let pull = if here.norm() > 0.7 * half_m {
         0.3 * inwards.y.atan2(inwards.x)
     } else {
         0.0

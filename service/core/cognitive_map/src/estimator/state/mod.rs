@@ -15,13 +15,14 @@ use codecs::{ListUpTo, MapUpTo, Shared, SortedUpTo, UpTo};
 
 use super::agent_filter::{AgentFilter, BODY_DIM, Run};
 use super::agent_slot::{AgentSlot, AgentState, Detached};
+use super::archived_landmark::{ArchivedLandmark, Tie};
 use super::associations::{Association, Associations};
 use super::covariance::JointCovariance;
 use super::doubtful_motion::DoubtfulMotion;
 use super::frame::{Frame, LANDMARK_DIM, LandmarkState, Member};
 use super::frame_match::FrameMatch;
 use super::joint::Estimator;
-use super::landmark_archive::{ArchivedLandmark, LandmarkArchive};
+use super::landmark_archive::LandmarkArchive;
 use super::landmark_evidence::{LandmarkEvidence, Rival};
 use super::noise_part::NoisePart;
 use super::noise_share::NoiseShare;
@@ -42,7 +43,7 @@ use super::standing::{Read, Standing};
 use super::tuning::{
     ARCHIVE_PART_MAX, ARCHIVE_PARTS, ASSOCIATIONS_MAX, CROSS_SIGHTINGS_MAX, FRAME_MATCHES_MAX,
     HISTORY_LEN, LANDMARKS_MAX, MEMBERS_MAX, NOISE_SHARES_MAX, NOISE_TARGETS_MAX, OBSERVERS_MAX,
-    PENDING_MAX, RANGE_POINTS_MAX, RANGED_MAX, RECENT_SIGHTINGS_MAX, SENSOR_TARGETS_MAX,
+    PENDING_MAX, RANGE_POINTS_MAX, RANGED_MAX, RECENT_SIGHTINGS_MAX, SENSOR_TARGETS_MAX, TIES_MAX,
 };
 use super::understated_noise::UnderstatedNoise;
 use ::state::{
@@ -189,11 +190,21 @@ state_of_struct!(AgentState {
     doubt,
     too_long
 });
+state_of_struct!(Tie {
+    anchor,
+    number,
+    position,
+    gain
+});
 state_of_struct!(ArchivedLandmark {
+    number,
     position,
     covariance,
+    ties as ListUpTo<TIES_MAX>,
+    rest,
     left,
-    only
+    only,
+    evidence
 });
 
 state_of_struct!(OdometryHistory {
@@ -240,6 +251,7 @@ state_of_struct!(LandmarkState {
     position,
     offset as UpTo<DIM_MAX>,
     used,
+    is_anchor,
     evidence,
     observers
 });
