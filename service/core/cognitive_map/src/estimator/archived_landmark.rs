@@ -109,8 +109,8 @@ impl ArchivedLandmark {
     }
 }
 
-/// Where the middle of anchors was, and how they have turned about it together. Of some that lie on a
-/// line or at a point, the least turn.
+/// Where the middle of anchors was, and how they have turned about it together. Of some that lie on
+/// a line or at a point, the least turn.
 fn anchors_turn(
     anchors: &[Point3<f64>],
     ties: &[Tie],

@@ -14,7 +14,7 @@ use super::frame::{Frame, LANDMARK_DIM, LandmarkState};
 use super::jacobian::Block;
 use super::measurement_update::point_block;
 use super::observers::Observers;
-use super::tuning::{LANDMARKS_MAX, TIED_DEPTH_MAX};
+use super::tuning::{LANDMARKS_MAX, RESTORED_MAX, TIED_DEPTH_MAX, TIES_FOLLOWED_MAX};
 use super::verdict::Outcome;
 use crate::input::Label;
 
@@ -123,7 +123,10 @@ impl Frame {
             }
             let anchor = self.archive.get(&tie.anchor);
             let anchor = anchor.filter(|anchor| anchor.number == tie.number)?;
-            (depth < TIED_DEPTH_MAX).then(|| self.by_now(anchor, depth + 1).position)
+            if depth == TIES_FOLLOWED_MAX {
+                return Some(anchor.position);
+            }
+            Some(self.by_now(anchor, depth + 1).position)
         };
         let anchors: Option<Vec<Point3<f64>>> = archived.ties.iter().map(position).collect();
         match anchors {
@@ -143,7 +146,7 @@ impl Frame {
             return;
         };
         for tie in &archived.ties {
-            if depth < TIED_DEPTH_MAX {
+            if depth < TIED_DEPTH_MAX && self.landmarks.len() < RESTORED_MAX {
                 self.restore_within(&tie.anchor, depth + 1);
             }
         }

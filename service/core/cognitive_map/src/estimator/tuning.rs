@@ -22,6 +22,10 @@ pub(super) const ANCHORS_MAX: usize = LANDMARKS_MAX / 4;
 pub(super) const TIES_MAX: usize = 3;
 /// Most archived anchors of anchors that come back with a landmark, one after the other.
 pub(super) const TIED_DEPTH_MAX: u32 = 16;
+/// Joint landmarks from which on anchors do not come back with a landmark. Source: memory.
+pub(super) const RESTORED_MAX: usize = 2 * LANDMARKS_MAX;
+/// Archived anchors of anchors that are followed to read where a landmark is. Source: three each.
+pub(super) const TIES_FOLLOWED_MAX: u32 = 3;
 /// How near to one another, or to a line, anchors say little of how they have turned \[m\]. Source:
 /// the deviation of a landmark that is seen well.
 pub(super) const TURN_ARM_M: f64 = 0.02;
