@@ -16,6 +16,8 @@ pub(super) struct Tie {
     pub(super) number: u64,
     /// Where the anchor was when the landmark left.
     pub(super) position: Point3<f64>,
+    /// The anchor's covariance then \[m²\].
+    pub(super) covariance: Matrix3<f64>,
     /// Gₖ.
     pub(super) gain: Matrix3<f64>,
 }
@@ -41,6 +43,31 @@ pub(super) struct ArchivedLandmark {
 }
 
 impl ArchivedLandmark {
+    /// With those of its ties alone of which `position` knows where the anchor is; answers where
+    /// they are. What the others said of it counts as unknown.
+    pub(super) fn tied_to(
+        &self,
+        position: impl Fn(&Tie) -> Option<Point3<f64>>,
+    ) -> (Self, Vec<Point3<f64>>) {
+        let mut tied = self.clone();
+        let mut anchors = Vec::with_capacity(tied.ties.len());
+        let mut rest = self.rest;
+        tied.ties.retain(|tie| {
+            let known = position(tie);
+            match known {
+                Some(anchor) => anchors.push(anchor),
+                None => rest += tie.gain * tie.covariance * tie.gain.transpose(),
+            }
+            known.is_some()
+        });
+        tied.rest = if anchors.is_empty() {
+            self.covariance
+        } else {
+            symmetric(&rest)
+        };
+        (tied, anchors)
+    }
+
     /// Where it is and what its anchors say of it, as they are by now: with the motions Δₖ of the
     /// anchors, and with the turn R that they have made together about their centre,
     ///
@@ -49,6 +76,7 @@ impl ArchivedLandmark {
     /// Gₖ ← R Gₖ Rᵀ
     /// ```
     ///
+    /// with positions from that centre.
     /// The gains say what small motions of the anchors say; S is what is left of a large turn. So a
     /// map that is turned as a whole stays as it is, and what nobody can know, where all of it
     /// lies, stays unknown.
@@ -58,11 +86,14 @@ impl ArchivedLandmark {
         let left = rotation - Matrix3::identity() - turn.scaled_axis().cross_matrix();
         let mut moved = self.clone();
         moved.position += left * (self.position.coords - centre);
-        moved.rest = symmetric(&(rotation * self.rest * rotation.transpose()));
+        let turned = |matrix: &Matrix3<f64>| symmetric(&(rotation * matrix * rotation.transpose()));
+        moved.rest = turned(&self.rest);
+        moved.covariance = turned(&self.covariance);
         for (tie, anchor) in moved.ties.iter_mut().zip(anchors) {
             let motion = (anchor - tie.position) - left * (tie.position.coords - centre);
             moved.position += tie.gain * motion;
             tie.gain = rotation * tie.gain * rotation.transpose();
+            tie.covariance = turned(&tie.covariance);
             tie.position = *anchor;
         }
         moved
@@ -91,6 +122,7 @@ impl ArchivedLandmark {
             anchor: tie.anchor.clone(),
             number: tie.number,
             position: alignment.pose * tie.position,
+            covariance: turned(&(tie.covariance + spread(&by_alignment(&tie.position)))),
             gain: rotation * tie.gain * rotation.transpose(),
         };
         Self {
@@ -157,6 +189,7 @@ mod tests {
             anchor: Label::new(&format!("anchor {k}")).unwrap(),
             number: k as u64,
             position: *anchor,
+            covariance: Matrix3::identity(),
             gain: gain.fixed_columns::<3>(3 * k).into_owned(),
         };
         ArchivedLandmark {

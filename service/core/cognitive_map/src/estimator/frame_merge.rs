@@ -81,7 +81,7 @@ impl Frame {
             }
         }
         let first_number = self.numbered;
-        self.numbered += newer.numbered;
+        self.numbered = self.numbered.saturating_add(newer.numbered);
         let start = self.covariance.grow(newer.covariance.dim());
         self.covariance.place(start, &newer.covariance);
         let tau = self.covariance.grow(6);
@@ -159,7 +159,7 @@ impl Frame {
             landmark.position = alignment.pose * landmark.position;
             landmark.used = self.sightings;
             landmark.evidence.rival = None; // its position was one of the other frame
-            landmark.number += first_number;
+            landmark.number = landmark.number.saturating_add(first_number);
             landmark.is_anchor = false;
             if self.archive.contains(&label) {
                 duplicates.push((label, landmark));
@@ -189,12 +189,10 @@ impl Frame {
             }
             let mut archived = landmark.aligned(alignment);
             archived.left = self.sightings;
-            archived.number += first_number;
+            archived.number = archived.number.saturating_add(first_number);
             for tie in &mut archived.ties {
-                // An anchor that is known here, too, is one with that.
-                let known = self.landmarks.get(&tie.anchor);
-                let known = known.filter(|anchor| anchor.number < first_number);
-                tie.number = known.map_or(tie.number + first_number, |anchor| anchor.number);
+                // An anchor that is known here, too, keeps its number here, and ties nothing.
+                tie.number = tie.number.saturating_add(first_number);
             }
             self.archive.insert(label.clone(), archived);
         }

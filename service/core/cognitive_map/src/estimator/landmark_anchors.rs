@@ -10,8 +10,8 @@
 //! ```
 //!
 //! When it comes back, its error goes with theirs again, and what has moved them since has moved
-//! it. Taken for independent instead, landmarks that left and came back would let everybody believe
-//! a little more each time, without end.
+//! it. Taken for independent instead, landmarks that left and came back would make everybody surer
+//! each time.
 
 use nalgebra::{Matrix3, SMatrix};
 
@@ -59,6 +59,7 @@ impl Frame {
             anchor: label.clone(),
             number: anchor.number,
             position: anchor.position,
+            covariance: self.landmark_covariance(anchor),
             gain: gain.fixed_columns::<3>(k * LANDMARK_DIM).into_owned(),
         };
         (anchors.into_iter().enumerate().map(tie).collect(), rest)
@@ -70,8 +71,12 @@ impl Frame {
     }
 
     /// Whether a landmark that is about to leave should rather stay as an anchor, and which one is
-    /// none any more then: anchors are as far apart as they can be.
+    /// none any more then: one of the two that are closest to one another, if the landmark is
+    /// farther from all. One that was seen once may not be there.
     pub(super) fn as_anchor(&self, landmark: &LandmarkState) -> Option<AnchorChange> {
+        if !landmark.evidence.is_confirmed {
+            return None;
+        }
         let anchors: Vec<(&Label, &LandmarkState)> = self.anchors().collect();
         if anchors.len() < ANCHORS_MAX {
             return Some(AnchorChange { instead_of: None });

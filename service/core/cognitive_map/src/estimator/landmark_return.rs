@@ -113,12 +113,10 @@ impl Frame {
         Some((landmark.position, self.landmark_covariance(landmark)))
     }
 
-    /// An archived landmark as its anchors have it by now; as it was, if one of them is not known
-    /// any more.
+    /// An archived landmark as those of its anchors have it by now that are still known.
     pub(super) fn by_now(&self, archived: &ArchivedLandmark, depth: u32) -> ArchivedLandmark {
         let position = |tie: &Tie| {
-            let joint = self.landmarks.get(&tie.anchor);
-            if let Some(anchor) = joint.filter(|anchor| anchor.number == tie.number) {
+            if let Some(anchor) = self.joint_anchor(tie) {
                 return Some(anchor.position);
             }
             let anchor = self.archive.get(&tie.anchor);
@@ -128,11 +126,17 @@ impl Frame {
             }
             Some(self.by_now(anchor, depth + 1).position)
         };
-        let anchors: Option<Vec<Point3<f64>>> = archived.ties.iter().map(position).collect();
-        match anchors {
-            Some(anchors) if !anchors.is_empty() => archived.moved_with(&anchors, self.is_planar()),
-            _ => archived.clone(),
+        let (tied, anchors) = archived.tied_to(position);
+        if anchors.is_empty() {
+            return tied;
         }
+        tied.moved_with(&anchors, self.is_planar())
+    }
+
+    /// An anchor that is estimated jointly, whatever it is called by now.
+    fn joint_anchor(&self, tie: &Tie) -> Option<&LandmarkState> {
+        let mut landmarks = self.landmarks.values();
+        landmarks.find(|landmark| landmark.number == tie.number)
     }
 
     /// Takes a landmark back into the joint estimate, if it is archived, and before it the anchors
@@ -142,6 +146,9 @@ impl Frame {
     }
 
     fn restore_within(&mut self, label: &Label, depth: u32) {
+        if self.landmarks.contains_key(label) {
+            return;
+        }
         let Some(archived) = self.archive.remove(label) else {
             return;
         };
@@ -150,41 +157,36 @@ impl Frame {
                 self.restore_within(&tie.anchor, depth + 1);
             }
         }
+        // What is tied to anchors that did not come back is unknown, too.
+        let (archived, _) = archived.tied_to(|tie| Some(self.joint_anchor(tie)?.position));
         let archived = self.by_now(&archived, 0);
-        let offset = if let Some(blocks) = self.by_anchors(&archived) {
-            self.covariance.append(&blocks, &archived.rest)
-        } else {
-            let offset = self.covariance.grow(LANDMARK_DIM);
-            self.covariance.set_diagonal(offset, &archived.covariance);
-            offset
-        };
+        let blocks = archived.ties.iter().filter_map(|tie| {
+            let anchor = self.joint_anchor(tie)?;
+            Some(point_block(anchor.offset, &tie.gain))
+        });
+        let blocks: Vec<Block<3>> = blocks.collect();
+        let offset = self.covariance.append(&blocks, &archived.rest);
         let mut observers = Observers::default();
         match archived.only {
             Some(agent) => observers.note(agent),
             None => observers = Observers::unknown(),
         }
+        // Anchors that come with it were not seen: they are the first that leave again.
+        let used = if depth == 0 {
+            self.sightings
+        } else {
+            archived.left
+        };
         let landmark = LandmarkState {
             number: archived.number,
             position: archived.position,
             offset,
-            used: self.sightings,
+            used,
             is_anchor: false,
             evidence: archived.evidence,
             observers,
         };
         Arc::make_mut(&mut self.landmarks).insert(label.clone(), landmark);
-    }
-
-    /// How the error of a landmark depends on those of its anchors; nothing if one of them is not
-    /// estimated jointly.
-    fn by_anchors(&self, archived: &ArchivedLandmark) -> Option<Vec<Block<3>>> {
-        let block = |tie: &Tie| {
-            let anchor = self.landmarks.get(&tie.anchor);
-            let anchor = anchor.filter(|anchor| anchor.number == tie.number)?;
-            Some(point_block(anchor.offset, &tie.gain))
-        };
-        let blocks: Option<Vec<Block<3>>> = archived.ties.iter().map(block).collect();
-        blocks.filter(|blocks| !blocks.is_empty())
     }
 }
 
@@ -272,6 +274,38 @@ mod tests {
             assert!((own_now - own).norm() < 1e-4 * own.norm());
             assert!((across_now - across).norm() < 1e-4 * own.norm());
         }
+    }
+
+    #[test]
+    fn a_landmark_whose_anchor_is_forgotten_stays_tied_to_the_others() {
+        let (mut estimator, _, number) = one();
+        let frame = estimator.frame_mut(MAP);
+        let ties = frame.archive.get(&label(number)).unwrap().ties.clone();
+        frame.forget(&ties[0].anchor);
+        frame.restore(&label(number));
+        let landmark = &frame.landmarks[&label(number)];
+        let across = |tie: &Tie| -> Matrix3<f64> {
+            let anchor = &frame.landmarks[&tie.anchor];
+            frame.covariance.block(landmark.offset, anchor.offset)
+        };
+        let own = frame.landmark_covariance(landmark);
+        for tie in &ties[1..] {
+            assert!(across(tie).norm() > 0.01 * own.norm(), "{}", across(tie));
+        }
+    }
+
+    /// What was seen once far off may not be there.
+    #[test]
+    fn no_landmark_that_was_seen_once_stays_for_the_others() {
+        let mut estimator = Estimator::new(Parameters::default());
+        let agent = estimator.enrol();
+        assert!(estimator.found(agent));
+        for number in 0..POSTS {
+            see(&mut estimator, agent, number, &post(number));
+        }
+        let frame = estimator.frame(MAP);
+        assert!(frame.landmarks.values().all(|landmark| !landmark.is_anchor));
+        assert!(frame.archive.contains(&label(0)));
     }
 
     #[test]

@@ -20,11 +20,14 @@ pub(super) const LANDMARKS_MAX: usize = 96;
 pub(super) const ANCHORS_MAX: usize = LANDMARKS_MAX / 4;
 /// Anchors of an archived landmark. Source: three points of a body tell how it moves in space.
 pub(super) const TIES_MAX: usize = 3;
-/// Most archived anchors of anchors that come back with a landmark, one after the other.
+/// Generations of archived anchors that come back with a landmark: its own, theirs, and so on.
+/// Source: more than the six that the ring of `tests/estimator/large_hall.rs` has.
 pub(super) const TIED_DEPTH_MAX: u32 = 16;
-/// Joint landmarks from which on anchors do not come back with a landmark. Source: memory.
+/// Joint landmarks from which on anchors do not come back with a landmark. Source: a sighting costs
+/// the square.
 pub(super) const RESTORED_MAX: usize = 2 * LANDMARKS_MAX;
-/// Archived anchors of anchors that are followed to read where a landmark is. Source: three each.
+/// Generations of them that are followed to read where a landmark is. Source: three anchors each
+/// make forty in all.
 pub(super) const TIES_FOLLOWED_MAX: u32 = 3;
 /// How near to one another, or to a line, anchors say little of how they have turned \[m\]. Source:
 /// the deviation of a landmark that is seen well.

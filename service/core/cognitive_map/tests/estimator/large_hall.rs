@@ -142,7 +142,7 @@ impl Ring {
 const LAPS: usize = 5;
 
 /// What the robot was off by when it came into the ring, everything in it shares. Its posts leave
-/// the joint estimate and come back with every lap, and that error stays as large as it is.
+/// the joint estimate and come back with every lap, and that error is not averaged away.
 #[test]
 #[allow(clippy::print_stdout, reason = "a figure of the documentation")]
 fn laps_past_archived_landmarks_do_not_make_a_robot_sure() {

@@ -194,6 +194,7 @@ state_of_struct!(Tie {
     anchor,
     number,
     position,
+    covariance,
     gain
 });
 state_of_struct!(ArchivedLandmark {
