@@ -77,20 +77,21 @@ impl ArchivedLandmark {
     /// ```
     ///
     /// with positions from that centre.
-    /// The gains say what small motions of the anchors say; S is what is left of a large turn. So a
-    /// map that is turned as a whole stays as it is, and what nobody can know, where all of it
-    /// lies, stays unknown.
+    ///
+    /// The gains hold for small motions of the anchors; S is what a large turn does beyond those.
+    /// So a landmark keeps its place in a map that is turned as a whole, and what nobody can know,
+    /// where all of it lies, stays unknown.
     pub(super) fn moved_with(&self, anchors: &[Point3<f64>], is_planar: bool) -> Self {
         let (centre, turn) = anchors_turn(anchors, &self.ties, is_planar);
         let rotation = turn.to_rotation_matrix().into_inner();
-        let left = rotation - Matrix3::identity() - turn.scaled_axis().cross_matrix();
+        let beyond = rotation - Matrix3::identity() - turn.scaled_axis().cross_matrix();
         let mut moved = self.clone();
-        moved.position += left * (self.position.coords - centre);
+        moved.position += beyond * (self.position.coords - centre);
         let turned = |matrix: &Matrix3<f64>| symmetric(&(rotation * matrix * rotation.transpose()));
         moved.rest = turned(&self.rest);
         moved.covariance = turned(&self.covariance);
         for (tie, anchor) in moved.ties.iter_mut().zip(anchors) {
-            let motion = (anchor - tie.position) - left * (tie.position.coords - centre);
+            let motion = (anchor - tie.position) - beyond * (tie.position.coords - centre);
             moved.position += tie.gain * motion;
             tie.gain = rotation * tie.gain * rotation.transpose();
             tie.covariance = turned(&tie.covariance);

@@ -1,4 +1,5 @@
-//! Landmarks that are seen for the first time.
+//! Landmarks that are not estimated jointly when they are seen: new ones take their place from the
+//! sighting, archived ones come back (`landmark_return`).
 
 use std::sync::Arc;
 

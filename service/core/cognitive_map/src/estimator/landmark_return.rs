@@ -75,8 +75,9 @@ impl Frame {
         self.archive.insert(label.clone(), archived);
     }
 
-    /// An archived landmark was seen by an observer, which `update` takes in as it does any other
-    /// one's sighting.
+    /// An observer saw a landmark; answers nothing if it is not archived. `update` takes the
+    /// sighting in as of any landmark that is estimated jointly, as it is for that time; it stays
+    /// so if the sighting fits.
     pub(super) fn update_by_archived(
         &mut self,
         observer: usize,
