@@ -43,6 +43,7 @@ pub(crate) struct IndexedModel {
     pub(crate) open: Option<OpenRegion>,
     /// The surface, if the places have normals.
     pub(crate) surfel_map: Option<SurfelMap>,
+    has_body: bool,
     shares: [f64; SHARE_BINS + 1],
 }
 
@@ -55,7 +56,7 @@ impl IndexedModel {
             .collect();
         let graph = LinkGraph::new(&felt);
         let usual = without_unusual_levels(model.places());
-        let fields = Fields::learned(&usual, &graph);
+        let fields = Fields::learned(&usual, &graph, graph.is_dense(spacing_m));
         let spread = Spread::learned(model.places(), &graph, spacing_m);
         let between = fields.as_ref().filter(|_| spread == Spread::Even);
         // On a surface contacts fall up to half a link beside a place, or half the step of nodes.
@@ -84,6 +85,7 @@ impl IndexedModel {
             let nodes = interpolated(&usual, &graph, fields, spacing_m);
             places.extend(nodes);
         }
+        let has_body = between.is_some_and(|fields| fields.body().is_some());
         let positions: Vec<_> = places.iter().map(|place| place.position).collect();
         let middle = centroid(positions.iter().map(|position| position.coords));
         let radius_m = positions
@@ -97,8 +99,11 @@ impl IndexedModel {
             gaps: (fields.is_none() && spread == Spread::Even)
                 .then(|| UnpredictedGaps::new(&felt, &graph, spacing_m))
                 .flatten(),
-            open: fields
-                .and_then(|_| OpenRegion::new(&positions, felt.len(), &graph, (spread, spacing_m))),
+            open: fields.as_ref().and_then(|fields| {
+                let unexpected = fields.body().map(|body| body.unexpected);
+                let felt = felt.len();
+                OpenRegion::new(&positions, felt, &graph, (spread, spacing_m), unexpected)
+            }),
             area_m2: positions.len() as f64 * spacing_m * spacing_m,
             surfel_map: SurfelMap::new(model),
             extent_m,
@@ -108,8 +113,14 @@ impl IndexedModel {
             between_sd_m: between_sd_m(&places),
             missed_share: (spread == Spread::OnPlaces).then(|| missed_share(model.places())),
             own_levels: object_levels(places.iter().flat_map(|place| &place.levels)),
+            has_body,
             places,
         }
+    }
+
+    /// Whether what was predicted is known from the places around alone: no body explains it.
+    pub(crate) fn is_vague(&self) -> bool {
+        self.shares_errors() && !self.has_body
     }
 
     /// Whether contacts share errors: some of its places were predicted from others.

@@ -27,6 +27,15 @@ pub(crate) struct Prediction {
     /// Standard deviation of its error across the surface, per axis \[m\].
     pub(crate) error_m: f64,
     pub(crate) across: Across,
+    /// Variance across the surface by which it may bend within the place's field, per axis \[m²\].
+    pub(crate) bend_m2: f64,
+}
+
+impl Prediction {
+    /// Variance of a touch across the surface, without the touch's noise \[m²\].
+    pub(crate) fn across_m2(&self) -> f64 {
+        self.error_m * self.error_m + self.bend_m2
+    }
 }
 
 /// What is across a surface: one direction, across a curve two, and all where neither was found.

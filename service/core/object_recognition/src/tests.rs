@@ -11,6 +11,7 @@ use super::{
 use crate::numeric::log_sum;
 use crate::translations::GaussianSum;
 
+mod bodies;
 mod levels;
 mod sizes;
 mod sparse;

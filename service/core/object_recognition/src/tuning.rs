@@ -180,8 +180,62 @@ pub(crate) const BETWEEN_MIN: usize = 16;
 /// that have nothing to do with them: less says little of what lies beside a place \[nats\].
 /// Chosen.
 pub(crate) const PREDICTED_NATS: f64 = 10.0;
+/// The same of a model whose contacts were not at chosen points: whoever touches it again does so
+/// between them. Chosen.
+pub(crate) const PREDICTED_AT_RANDOM_NATS: f64 = 5.0;
 /// Degrees of freedom of the errors of a field: few are far larger than the rest. Chosen.
 pub(crate) const TAILS: f64 = 4.0;
+/// By how much a body through all places must be likelier than what the places around tell, each
+/// place predicted by others \[nats\]. Chosen.
+pub(crate) const BODY_NATS: f64 = 5.0;
+/// Deviations by which the distances of places differ from those of random ones, from which on they
+/// are taken for chosen ones. Chosen.
+pub(crate) const RANDOM_SDS: f64 = 2.0;
+/// Places by which the first steps to a body are made. Budget.
+pub(crate) const BODY_SAMPLES: usize = 128;
+/// First steps from each start. Budget.
+pub(crate) const BODY_FIRST_STEPS: usize = 6;
+/// Bodies of these that are kept. Budget.
+pub(crate) const BODY_KEPT: usize = 4;
+/// Least probability of one beside the best that is looked at. Chosen.
+pub(crate) const BODY_PROBABILITY_MIN: f64 = 0.01;
+/// Last steps of each. Budget.
+pub(crate) const BODY_LAST_STEPS: usize = 30;
+/// Largest change of a turn \[rad\], of the logarithm of a size or an exponent, or of the taper in a
+/// step. Chosen.
+pub(crate) const BODY_STEP_MAX: f64 = 0.5;
+/// Parts of the places that are left out, one after the other. Budget.
+pub(crate) const BODY_FOLDS: usize = 12;
+/// Steps without each. Budget.
+pub(crate) const BODY_FOLD_STEPS: usize = 8;
+/// Deviations from a body beyond which a place is not as it predicts. Chosen.
+pub(crate) const BODY_MISSED_SDS: f64 = 4.0;
+/// Logarithm of a body's exponents, as expected: 3.3, between an ellipsoid and a box. Chosen.
+pub(crate) const EXPONENT_LOG: f64 = 1.2;
+/// Its standard deviation. Chosen.
+pub(crate) const EXPONENT_LOG_SD: f64 = 1.0;
+/// Range of it: from a body with pinched edges to one whose edges are as sharp as can be felt.
+/// Chosen.
+pub(crate) const EXPONENT_LOG_RANGE: [f64; 2] = [0.3, 3.7];
+/// Standard deviation of the logarithm of a body's sizes. Chosen.
+pub(crate) const SIZE_LOG_SD: f64 = 1.0;
+/// Standard deviation of a body's taper. Chosen.
+pub(crate) const TAPER_SD: f64 = 0.3;
+/// Largest taper: a body with a tip. Chosen.
+pub(crate) const TAPER_MAX: f64 = 0.95;
+/// Points of a body of which nodes are chosen. Budget.
+pub(crate) const BODY_POINTS: u32 = 16_384;
+/// Points of a body by which is told whether all of it was felt. Budget.
+pub(crate) const SIDE_SAMPLES: u32 = 4_096;
+/// Least distance of these, per half its mean size. Budget.
+pub(crate) const SIDE_SAMPLES_APART: f64 = 0.15;
+/// Cosine of the angle between the normals on one side of a body and its axis, at least: 37°, so
+/// that edges are on no side. Chosen.
+pub(crate) const SIDE_NORMAL_COS: f64 = 0.8;
+/// Least probability of so few places on one side of a body as there are. Chosen.
+pub(crate) const SIDE_PROBABILITY_MIN: f64 = 0.01;
+/// Least distance of two nodes on a body, in steps. Chosen.
+pub(crate) const BODY_APART: f64 = 0.85;
 /// Places whose errors scale the variance of a field around. Chosen.
 pub(crate) const ERROR_NEIGHBOURS: usize = 6;
 /// Share of contacts that fall evenly over a surface, and not on its places alone, below which
@@ -222,8 +276,8 @@ pub(crate) const NODE_FIELD: f64 = 0.288_675;
 pub(crate) const TRANSLATIONS_MAX: usize = 2048;
 /// A hypothesis so far below the best holds nothing worth its keep \[nats\]. Chosen.
 pub(crate) const PRUNE_NATS: f64 = 20.0;
-/// The same of a model of which contacts share errors: few of them count in full, so that what lies
-/// so far behind seldom catches up. Chosen.
+/// The same of a model of which contacts share errors and that has no body: few of them count in
+/// full, so that what lies so far behind seldom catches up. Chosen.
 pub(crate) const SHARED_PRUNE_NATS: f64 = 14.0;
 /// A hypothesis splits where several places could be the one touched; each part has this share of
 /// the contact's likelihood at least. Chosen.

@@ -30,6 +30,12 @@ pub enum Family {
     Box,
     /// Cylinders of 2 to 5 cm in radius and 6 to 16 cm high, with bands of level.
     Cylinder,
+    /// Cones without a tip, 2 to 5 cm in mean radius and 6 to 16 cm high, with bands of level.
+    Frustum,
+    /// Upright prisms of three to six sides, as large, with bands of level.
+    Prism,
+    /// Two boxes at an angle, each 2 to 4 cm thick and 6 to 12 cm long, with smooth levels.
+    Bracket,
 }
 
 /// Ranges of the levels of a family's objects.
@@ -44,7 +50,15 @@ pub enum Levels {
 
 impl Family {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Outline, Self::Blob, Self::Box, Self::Cylinder];
+    pub const ALL: [Self; 7] = [
+        Self::Outline,
+        Self::Blob,
+        Self::Box,
+        Self::Cylinder,
+        Self::Frustum,
+        Self::Prism,
+        Self::Bracket,
+    ];
 
     /// A random object.
     pub fn draw(self, levels: Levels, random: &mut ChaCha8Rng) -> Solid {
@@ -54,8 +68,10 @@ impl Family {
         };
         let form = self.form(random);
         let field = match self {
-            Self::Outline | Self::Blob => waves(middle, self == Self::Outline, random),
-            Self::Box | Self::Cylinder => bands(middle, random),
+            Self::Outline | Self::Blob | Self::Bracket => {
+                waves(middle, self == Self::Outline, random)
+            }
+            Self::Box | Self::Cylinder | Self::Frustum | Self::Prism => bands(middle, random),
         };
         Solid::new(form, field)
     }
@@ -86,8 +102,51 @@ impl Family {
                 radius_m: random.random_range(0.02..0.05),
                 half_m: random.random_range(0.03..0.08),
             },
+            Self::Frustum => {
+                let (radius_m, half_m) = (
+                    random.random_range(0.02..0.05),
+                    random.random_range(0.03..0.08),
+                );
+                // The radius at one end is from three tenths to nine tenths of that at half.
+                let growth = random.random_range(0.1..0.7) * radius_m / half_m;
+                Form::Frustum {
+                    radius_m,
+                    growth,
+                    half_m,
+                }
+            }
+            Self::Prism => prism(random),
+            Self::Bracket => bracket(random),
         }
     }
+}
+
+/// An upright prism about its middle.
+fn prism(random: &mut ChaCha8Rng) -> Form {
+    let sides: u8 = random.random_range(3..=6);
+    let (radius_m, half_m) = (
+        random.random_range(0.02..0.05),
+        random.random_range(0.03..0.08),
+    );
+    let from = random.random_range(0.0..TAU);
+    let side = |k: u8| {
+        let (sin, cos) = (from + TAU * f64::from(k) / f64::from(sides)).sin_cos();
+        (Vector3::new(cos, sin, 0.0), radius_m)
+    };
+    let ends = [Vector3::z(), -Vector3::z()].map(|end| (end, half_m));
+    Form::Prism((0..sides).map(side).chain(ends).collect())
+}
+
+/// Two boxes along x and z that share a corner, about the middle of what they share.
+fn bracket(random: &mut ChaCha8Rng) -> Form {
+    let thick_m = random.random_range(0.01..0.02);
+    let [long_m, high_m] = [0, 1].map(|_| random.random_range(0.05..0.1));
+    let wide_m = random.random_range(0.015..0.04);
+    let below = Vector3::new(thick_m, wide_m, thick_m);
+    Form::Bracket([
+        [below, Vector3::new(long_m, wide_m, thick_m)],
+        [below, Vector3::new(thick_m, wide_m, high_m)],
+    ])
 }
 
 /// A smooth level.

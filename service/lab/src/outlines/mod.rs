@@ -1,4 +1,5 @@
-//! Random objects as people make them: planar outlines with lobes, blobs, boxes and cylinders.
+//! Random objects as people make them: planar outlines with lobes, blobs, boxes, cylinders, frusta,
+//! prisms and brackets.
 //!
 //! A [`Family`] draws [`Solid`]s: a smooth or an edged surface, and a level that varies along it. A
 //! solid is taught by a few or many contacts, and touched again along a walk from an unknown start.

@@ -1,6 +1,7 @@
 //! Objects taught and touched again, through the fold.
 
 use std::f64::consts::PI;
+use std::num::NonZeroUsize;
 
 use cognitive_map::{
     AgentId, CognitiveMap, EventKind, InvalidSample, Label, Lesson, Level, Motion, ObjectMark,
@@ -12,9 +13,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
+use crate::eval::object::in_parallel;
+
 use super::explore::{gaussian, half_covered, lesson, walk};
 use super::protocol::{OutlineProtocol, Teaching, Turn};
-use super::report::{Answers, Row};
+use super::report::{Answers, Report, Row};
 use super::solid::{Felt, Solid};
 
 /// The channel of levels.
@@ -26,11 +29,24 @@ const HAND: AgentId = AgentId(0);
 /// First random stream of explorations: those below are the objects'.
 const EXPLORING: u64 = 1 << 40;
 
-/// Teaches and touches again all sets of a protocol. `explored` is called after each exploration.
+/// Teaches and touches again all sets of each protocol, so many protocols side by side. `explored`
+/// is called after each exploration.
 ///
 /// # Errors
 /// A number is beyond what a sample may say.
-pub fn run(protocol: &OutlineProtocol, explored: &impl Fn()) -> Result<Row, InvalidSample> {
+pub fn run(
+    protocols: &[OutlineProtocol],
+    threads: NonZeroUsize,
+    explored: &(impl Fn() + Sync),
+) -> Result<Report, InvalidSample> {
+    let row = |number: usize| run_row(&protocols[number], explored);
+    let rows = in_parallel(protocols.len(), threads, &row).into_iter();
+    Ok(Report {
+        rows: rows.collect::<Result<_, _>>()?,
+    })
+}
+
+fn run_row(protocol: &OutlineProtocol, explored: &impl Fn()) -> Result<Row, InvalidSample> {
     let mut row = Row {
         family: protocol.family,
         levels: protocol.levels,

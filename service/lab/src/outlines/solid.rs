@@ -34,6 +34,18 @@ pub(super) enum Form {
     Box(Vector3<f64>),
     /// An upright cylinder: radius and half its height \[m\].
     Cylinder { radius_m: f64, half_m: f64 },
+    /// An upright cone without its tip: radius at half its height, how much that grows per height,
+    /// and half its height \[m\].
+    Frustum {
+        radius_m: f64,
+        growth: f64,
+        half_m: f64,
+    },
+    /// A convex body of faces: normal and distance from the middle \[m\] of each.
+    Prism(Vec<(Vector3<f64>, f64)>),
+    /// Two boxes that hold the middle: the distances of the faces of each from it, on the negative
+    /// and the positive side \[m\].
+    Bracket([[Vector3<f64>; 2]; 2]),
 }
 
 /// How a level varies over a surface.
@@ -179,6 +191,26 @@ impl Solid {
             Form::Box(half_m) => 1.0 / unit.component_div(half_m).amax(),
             Form::Cylinder { radius_m, half_m } => {
                 1.0 / (unit.xy().norm() / radius_m).max(unit.z.abs() / half_m)
+            }
+            Form::Frustum {
+                radius_m,
+                growth,
+                half_m,
+            } => {
+                let side = (unit.xy().norm() - growth * unit.z) / radius_m;
+                1.0 / side.max(unit.z.abs() / half_m)
+            }
+            Form::Prism(faces) => {
+                let face = |(normal, off_m): &(Vector3<f64>, f64)| normal.dot(unit) / off_m;
+                1.0 / faces.iter().map(face).fold(f64::MIN_POSITIVE, f64::max)
+            }
+            Form::Bracket(boxes) => {
+                let to = |[below, above]: &[Vector3<f64>; 2]| {
+                    let face =
+                        |axis: usize| f64::max(unit[axis] / above[axis], -unit[axis] / below[axis]);
+                    1.0 / face(0).max(face(1)).max(face(2))
+                };
+                to(&boxes[0]).max(to(&boxes[1]))
             }
         }
     }

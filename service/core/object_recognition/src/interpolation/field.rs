@@ -4,11 +4,12 @@ use nalgebra::{Point3, Vector3};
 
 use super::graph::{LinkGraph, median};
 use super::kriging::{Kriging, Weights};
+use super::tails;
 use crate::indexed_place::Across;
 use crate::model::{LevelMemory, ModelPlace};
 use crate::tuning::{
     ERROR_NEIGHBOURS, FIELD_LENGTHS, FIELD_NOISES, FIELD_SAMPLES, KRIGING_CURVE, KRIGING_SURFACE,
-    PREDICTED_NATS, SHRINKAGE, TAILS,
+    SHRINKAGE,
 };
 
 /// What varies over a surface.
@@ -142,13 +143,13 @@ impl Field {
         }
     }
 
-    /// Whether the places around surely tell something of what is felt at a place.
+    /// How much the places around tell of what is felt at a place \[nats\], over all places.
     ///
     /// If they leave the share s of the variance of n levels open, the log-likelihood ratio of
     /// Gaussian levels that follow from them to independent ones is −n/2 ln s.
-    pub(super) fn is_predictable(&self, left_out: &[LeftOut], places: &[ModelPlace]) -> bool {
+    pub(super) fn predicted_nats(&self, left_out: &[LeftOut], places: &[ModelPlace]) -> f64 {
         let FieldOf::Level(channel) = self.of else {
-            return true;
+            return f64::INFINITY;
         };
         let errors = left_out.iter().filter_map(|own| self.error(own, places));
         let (count, error) = errors.fold((0.0, 0.0), |(n, sum), (error, _)| (n + 1.0, sum + error));
@@ -161,8 +162,8 @@ impl Field {
             .map(|level| (level - mean).powi(2))
             .sum::<f64>()
             / n;
-        let open = (-2.0 * PREDICTED_NATS / f64::max(count, 1.0)).exp();
-        error <= open * variance * count
+        let open = error / f64::max(variance * count, f64::MIN_POSITIVE);
+        -0.5 * count * open.ln()
     }
 
     /// Squared difference of a place from its prediction by the others, and the variance of that,
@@ -181,31 +182,17 @@ impl Field {
 
     /// Profile log-likelihood of a place, on average over those left out one by one, and the
     /// variance at which it is the largest.
-    ///
-    /// Errors follow Student's distribution: those at edges say little of all others.
     fn cross_validated(&self, left_out: &[&LeftOut], places: &[ModelPlace]) -> Option<(f64, f64)> {
         let errors = left_out.iter().filter_map(|own| {
             let (residual, variance) = self.error(own, places)?;
             Some((residual / variance, variance, own.from.len() as f64))
         });
         let errors: Vec<(f64, f64, f64)> = errors.collect();
-        let count = errors.len() as f64;
-        if count < 4.0 {
+        if errors.len() < 4 {
             return None;
         }
         // A floor against values that are all the same.
-        let mean =
-            |of: &dyn Fn(f64) -> f64| errors.iter().map(|own| of(own.0)).sum::<f64>() / count;
-        let mut variance = f64::max(mean(&|square| square), 1e-18);
-        for _ in 0..8 {
-            let weighted = |square: f64| square * (TAILS + 1.0) / (TAILS + square / variance);
-            variance = f64::max(mean(&weighted), 1e-18);
-        }
-        let log = |(square, own, sides): &(f64, f64, f64)| {
-            let tail = 0.5 * (TAILS + 1.0) * (square / (TAILS * variance)).ln_1p();
-            -0.5 * (variance * own).ln() - tail - sides.ln()
-        };
-        Some((errors.iter().map(log).sum::<f64>() / count, variance))
+        Some(tails::profile(&errors, 1e-18))
     }
 
     /// Squared difference of a place from its prediction.
@@ -295,6 +282,40 @@ impl LocalField {
         let own = weights.of.iter().zip(&self.near);
         let sum = own.map(|(w, number)| places[*number as usize].position_m.coords * *w);
         Point3::from(sum.sum::<Vector3<f64>>())
+    }
+
+    /// What is known of the level at a point; none where a place has no such level.
+    pub(super) fn memory(
+        &self,
+        at: &Point3<f64>,
+        channel: u16,
+        places: &[ModelPlace],
+    ) -> Option<LevelMemory> {
+        let (weights, variance) = self.at(at);
+        Some(LevelMemory {
+            channel,
+            count: 1.0,
+            mean: self.level(&weights, channel, places)?,
+            squares: 0.0,
+            noise: variance,
+        })
+    }
+
+    /// Variance of the level over the field of a point: along these axes it lies within one of
+    /// these offsets to either side \[m\].
+    pub(super) fn scatter(
+        &self,
+        at: &Point3<f64>,
+        (axes, field_m): (&[Vector3<f64>], f64),
+        channel: u16,
+        places: &[ModelPlace],
+    ) -> Option<f64> {
+        let level = |at: Point3<f64>| self.level(&self.weights(&at), channel, places);
+        let squares = axes.iter().map(|axis| {
+            let [above, below] = [at + axis * field_m, at - axis * field_m].map(level);
+            Some((0.5 * (above? - below?)).powi(2))
+        });
+        squares.sum()
     }
 
     /// The level that is predicted.

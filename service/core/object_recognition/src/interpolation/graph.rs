@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::tuning::{
-    END_LINKS, LINK_BALL, LINK_LENGTH_MAX, LINK_NEIGHBOURS, OPEN_CURVE_COS, OPEN_SURFACE_RAD,
-    RIM_MIN,
+    DENSE_LINK, END_LINKS, LINK_BALL, LINK_LENGTH_MAX, LINK_NEIGHBOURS, NODE_STEP, OPEN_CURVE_COS,
+    OPEN_SURFACE_RAD, RIM_MIN,
 };
 
 /// Places that neighbour one another.
@@ -80,6 +80,15 @@ impl LinkGraph {
     /// Whether the places lie along lines, for the most part.
     pub(crate) fn is_curve(&self) -> bool {
         2 * self.triangles.len() < self.links.len()
+    }
+
+    /// Whether a contact between two places is beside one of them anyway.
+    pub(crate) fn is_dense(&self, spacing_m: f64) -> bool {
+        if self.is_curve() {
+            self.longest_m <= NODE_STEP * spacing_m
+        } else {
+            self.typical_m <= DENSE_LINK * spacing_m
+        }
     }
 
     /// Places beyond which nothing was felt, in pieces that hang together.

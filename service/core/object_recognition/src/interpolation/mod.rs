@@ -6,19 +6,30 @@
 //! Gaussian process over the places around, whose length and variance are learned from the model's
 //! own places by leave-one-out cross-validation ([`field`]). Nothing stands between places where
 //! contacts fall on them alone ([`spread`]).
+//!
+//! Few contacts tell the surface better all together: a superellipsoid through them ([`body`]) takes
+//! the part of the places around where it predicts those left out better, and its nodes stand on it
+//! ([`body_nodes`]).
 
+mod body;
+mod body_fit;
+mod body_nodes;
 mod field;
+mod fields;
 mod graph;
 mod kriging;
 mod nodes;
 mod open;
 mod sides;
 mod spread;
+mod superellipsoid;
+mod tails;
 mod taken;
 mod unpredicted;
 
+pub(crate) use fields::Fields;
 pub(crate) use graph::LinkGraph;
-pub(crate) use nodes::{Fields, interpolated};
+pub(crate) use nodes::interpolated;
 pub(crate) use open::{OpenRegion, Part};
 pub(crate) use spread::{Spread, missed_share};
 pub(crate) use unpredicted::UnpredictedGaps;

@@ -2,16 +2,15 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::field::{Field, FieldOf, LocalField, Site};
+use super::body_nodes::on_body;
+use super::field::{LocalField, Site};
+use super::fields::{Fields, Surface, near};
 use super::graph::LinkGraph;
 use super::sides::Sides;
 use super::taken::Taken;
 use crate::indexed_place::{IndexedPlace, Prediction};
-use crate::model::{LevelMemory, ModelPlace};
-use crate::tuning::{
-    BETWEEN_MIN, DENSE_LINK, KRIGING_SURFACE, NODE_APART, NODE_ERROR, NODE_FIELD, NODE_STEP,
-    NODES_GROWTH, NODES_MAX,
-};
+use crate::model::ModelPlace;
+use crate::tuning::{NODE_APART, NODE_ERROR, NODE_FIELD, NODE_STEP, NODES_GROWTH, NODES_MAX};
 
 /// Most parts of the side of a triangle: a thousand points lie on it then.
 const PARTS_MAX: u32 = 46;
@@ -22,13 +21,6 @@ struct Span {
     corners: Vec<u32>,
     /// Number of its segment or triangle.
     site: usize,
-}
-
-/// The fields of a model.
-pub(crate) struct Fields {
-    place: Field,
-    levels: Vec<(u16, Field)>,
-    sides: Sides,
 }
 
 /// The nodes between the places of a model that have these links.
@@ -42,19 +34,18 @@ pub(crate) fn interpolated(
     spacing_m: f64,
 ) -> Vec<IndexedPlace> {
     let room = NODES_MAX.saturating_sub(places.len());
-    let is_dense = if graph.is_curve() {
-        graph.longest_m <= NODE_STEP * spacing_m
-    } else {
-        graph.typical_m <= DENSE_LINK * spacing_m
-    };
-    if room == 0 || is_dense {
+    if room == 0 || graph.is_dense(spacing_m) {
         return Vec::new();
     }
-    let sites = sites(places, graph, &fields.sides);
+    let (place, sides) = match &fields.surface {
+        Surface::Body(body) => return on_body(places, graph, (fields, body), spacing_m),
+        Surface::Local { place, sides } => (place, sides),
+    };
+    let sites = sites(places, graph, sides);
     // Finer steps than these never fit, or say no more.
     let finest_m = f64::max(
         graph.longest_m / NODES_MAX as f64,
-        fields.place.typical_error / NODE_ERROR,
+        place.typical_error / NODE_ERROR,
     );
     let mut step_m = f64::max(NODE_STEP * spacing_m, finest_m);
     let mut spans = spans(places, &sites, step_m);
@@ -65,9 +56,13 @@ pub(crate) fn interpolated(
     let mut nodes = Vec::with_capacity(spans.len());
     for of_site in spans.chunk_by(|a, b| a.site == b.site) {
         let site = &sites[of_site[0].site].0;
-        if let Some(local) = fields.around(site, places) {
-            nodes.extend(of_site.iter().map(|span| local.node(span, places, step_m)));
-        }
+        let near = near(site, places);
+        let Some(place) = fields.place_around(site, &near, places) else {
+            continue;
+        };
+        let levels = fields.levels_around(site, &near, places);
+        let local = LocalFields { place, levels };
+        nodes.extend(of_site.iter().map(|span| local.node(span, places, step_m)));
     }
     nodes
 }
@@ -168,70 +163,6 @@ fn shares(corners: usize, parts: u32) -> Vec<Vec<f64>> {
     shares
 }
 
-impl Fields {
-    /// `None` where neighbours tell little of one another, so that between them may be anything,
-    /// and of models that have too few or so many places that nothing lies between.
-    pub(crate) fn learned(places: &[ModelPlace], graph: &LinkGraph) -> Option<Self> {
-        let is_finite = graph.longest_m.is_finite() && graph.longest_m > 0.0;
-        if !(BETWEEN_MIN..NODES_MAX).contains(&places.len()) || !is_finite {
-            return None;
-        }
-        let mut channels: Vec<u16> = { places.iter() }
-            .flat_map(|place| place.levels.iter().map(|level| level.channel))
-            .collect();
-        channels.sort_unstable();
-        channels.dedup();
-        let smooth = Sides::none();
-        let anywhere = smooth.left_out(places, graph);
-        let level = |channel| {
-            let field = Field::learned(FieldOf::Level(channel), &anywhere, places, graph)?;
-            Some((channel, field.1))
-        };
-        let levels: Vec<(u16, Field)> = channels.into_iter().filter_map(level).collect();
-        let is_told = |field: &Field| field.is_predictable(&anywhere, places);
-        if !levels.iter().all(|(_, field)| is_told(field)) {
-            return None;
-        }
-        let (log, place) = Field::learned(FieldOf::Place, &anywhere, places, graph)?;
-        // Edges are supposed where places follow better from those on their own side.
-        let edged = Sides::new(places, graph).and_then(|sides| {
-            let left_out = sides.left_out(places, graph);
-            let (own, place) = Field::learned(FieldOf::Place, &left_out, places, graph)?;
-            (own > log).then_some((place, sides))
-        });
-        let (place, sides) = edged.unwrap_or((place, smooth));
-        Some(Self {
-            place,
-            levels,
-            sides,
-        })
-    }
-
-    fn around(&self, site: &Site, places: &[ModelPlace]) -> Option<LocalFields> {
-        let apart = |place: &ModelPlace| (place.position_m - site.middle).norm();
-        let near = places.iter().map(apart).zip(0u32..);
-        let mut near: Vec<(f64, u32)> = near.collect();
-        let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-        let most = 2 * KRIGING_SURFACE;
-        if near.len() > most {
-            near.select_nth_unstable_by(most, order);
-            near.truncate(most);
-        }
-        near.sort_unstable_by(order);
-        let near: Vec<u32> = near.into_iter().map(|(_, number)| number).collect();
-        let level = |(channel, field): &(u16, Field)| {
-            let local = field.around(site, &near, places)?;
-            Some((*channel, local))
-        };
-        Some(LocalFields {
-            place: self
-                .place
-                .around(site, &self.sides.near(places, site, &near), places)?,
-            levels: self.levels.iter().filter_map(level).collect(),
-        })
-    }
-}
-
 /// The fields of a model about a site.
 struct LocalFields {
     place: LocalField,
@@ -249,16 +180,7 @@ impl LocalFields {
             apart(a).total_cmp(&apart(b))
         });
         let field_m = NODE_FIELD * step_m;
-        let level = |(channel, local): &(u16, LocalField)| {
-            let (weights, variance) = local.at(&span.at);
-            Some(LevelMemory {
-                channel: *channel,
-                count: 1.0,
-                mean: local.level(&weights, *channel, places)?,
-                squares: 0.0,
-                noise: variance,
-            })
-        };
+        let level = |(channel, local): &(u16, LocalField)| local.memory(&span.at, *channel, places);
         let normals: Vector3<f64> = corners().map(|place| place.normals / place.count).sum();
         IndexedPlace {
             position,
@@ -267,6 +189,7 @@ impl LocalFields {
             prediction: Some(Prediction {
                 error_m: across_m2.sqrt(),
                 across: self.place.across(),
+                bend_m2: field_m * field_m,
             }),
             levels: self.levels.iter().filter_map(level).collect(),
             descriptors: nearest.map_or_else(Vec::new, |place| place.descriptors.clone()),

@@ -54,13 +54,15 @@ impl OpenRegion {
     /// Of places, of which the first `felt` were felt and have these links; none of a model that
     /// was felt all over and without gaps.
     ///
-    /// What is missing of a curve is taken for a straight line over each gap between two of its
+    /// `body_unexpected` is the share of contacts that are not as the model's body predicts, if it
+    /// has one. What is missing of a curve is taken for a straight line over each gap between two of its
     /// ends; what is missing of a surface for a disc with the circumference of each of its edges.
     pub(crate) fn new(
         positions: &[Point3<f64>],
         felt: usize,
         graph: &LinkGraph,
         (spread, spacing_m): (Spread, f64),
+        body_unexpected: Option<f64>,
     ) -> Option<Self> {
         if felt < BETWEEN_MIN {
             return None;
@@ -121,7 +123,7 @@ impl OpenRegion {
             entries: entries.into_iter().step_by(step).collect(),
             typical_m: graph.typical_m,
             unexpected: match spread {
-                Spread::Even => UNEXPECTED_SHARE,
+                Spread::Even => body_unexpected.unwrap_or(UNEXPECTED_SHARE),
                 Spread::OnPlaces => EVEN_SHARE_MIN,
             },
             unexplored: if is_open_anywhere {

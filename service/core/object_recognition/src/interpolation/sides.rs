@@ -222,7 +222,7 @@ impl Sides {
 }
 
 /// Two axes across a normal.
-fn along(normal: &Unit<Vector3<f64>>) -> Vec<Vector3<f64>> {
+pub(super) fn along(normal: &Unit<Vector3<f64>>) -> Vec<Vector3<f64>> {
     let least = Vector3::ith(normal.iamin(), 1.0);
     let first = normal.cross(&least).normalize();
     vec![first, normal.cross(&first)]

@@ -46,9 +46,10 @@ fn error_share(indexed: &IndexedModel, point: &Point3<f64>, contact: &Contact) -
             return;
         }
         let mut share = 0.0;
-        if place.prediction.is_some() {
+        if let Some(prediction) = &place.prediction {
             let noise = contact.position_sd_m * contact.position_sd_m;
-            share = place.variance_m2 / (place.variance_m2 + noise).max(f64::MIN_POSITIVE);
+            let error_m2 = prediction.across_m2();
+            share = error_m2 / (error_m2 + noise).max(f64::MIN_POSITIVE);
             for reading in &contact.levels {
                 let own = place.level(reading.channel);
                 if let Some(own) = own {

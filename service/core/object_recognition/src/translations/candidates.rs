@@ -20,9 +20,9 @@ pub(crate) struct Candidate {
     pub(crate) apart: Vector3<f64>,
     /// Variance of a touch of it, per axis \[m²\].
     pub(crate) variance: f64,
-    /// What is across the surface, and how far an error of the translation shows in the offset
-    /// there; none where it shows everywhere.
-    pub(crate) across: Option<(Across, f64)>,
+    /// What is across the surface, how far an error of the translation shows in the offset there,
+    /// and the variance of a touch there \[m²\]; none where all directions are alike.
+    pub(crate) across: Option<(Across, f64, f64)>,
 }
 
 impl Candidate {
@@ -30,12 +30,14 @@ impl Candidate {
     /// the Kalman gain P h/(h² P + R): h is how far an error of the translation shows in the
     /// offset. The variance is the mean over the axes.
     pub(crate) fn update(&self, prior_m2: f64) -> (Vector3<f64>, f64) {
-        let gain = |shown: f64| prior_m2 * shown / (shown * shown * prior_m2 + self.variance);
-        let along = gain(1.0);
-        let Some((across, shown)) = &self.across else {
+        let gain = |shown: f64, variance_m2: f64| {
+            prior_m2 * shown / (shown * shown * prior_m2 + variance_m2)
+        };
+        let along = gain(1.0, self.variance);
+        let Some((across, shown, across_m2)) = &self.across else {
             return (self.apart * along, prior_m2 - along * prior_m2);
         };
-        let gained = gain(*shown);
+        let gained = gain(*shown, *across_m2);
         let offset = across.projection * self.apart;
         let dimensions = f64::from(across.dimensions);
         let told = dimensions * gained * shown + (3.0 - dimensions) * along;
@@ -99,7 +101,7 @@ impl CandidateSearch {
     pub(crate) fn conditioned(
         &self,
         indexed: &IndexedModel,
-        error: &SharedError,
+        error: Option<&SharedError>,
         [translation_m2, noise_m2]: [f64; 2],
         candidates: &mut Vec<Candidate>,
     ) -> f64 {
@@ -108,7 +110,10 @@ impl CandidateSearch {
         let found = self.shortlist.found().iter().zip(&self.densities);
         for (near, density) in found.filter(|(_, density)| **density >= least) {
             let place = &indexed.places[indexed.packed.place(near.number as usize)];
-            let own = error.condition(place);
+            let own = error.map_or_else(
+                || SharedError::unknown(place),
+                |error| error.condition(place),
+            );
             let apart: Vector3<f64> = self.shortlist.apart(near).cast() + own.offset;
             let mut candidate = Candidate {
                 density: density * own.level_ratio,
@@ -117,11 +122,12 @@ impl CandidateSearch {
                 across: None,
             };
             if let Some(prediction) = &place.prediction {
-                candidate.across = Some((prediction.across, own.shown));
+                let own_across_m2 = noise_m2 + own.across_m2;
+                candidate.across = Some((prediction.across, own.shown, own_across_m2));
                 let across = prediction.across.projection * apart;
                 let dimensions = prediction.across.dimensions;
-                let [along_m2, across_m2] = [1.0, own.shown * own.shown]
-                    .map(|shown| candidate.variance + shown * translation_m2);
+                let along_m2 = candidate.variance + translation_m2;
+                let across_m2 = own_across_m2 + own.shown * own.shown * translation_m2;
                 let before_m2 = f64::from(near.variance);
                 let fall = f64::from(near.square) / before_m2
                     - across.norm_squared() / across_m2

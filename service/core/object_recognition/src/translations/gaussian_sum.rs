@@ -212,7 +212,7 @@ impl GaussianSum {
         let mut floors = Vec::new();
         for own in by_object() {
             let indexed = library.indexed(own[0].object);
-            let nats = if indexed.is_some_and(IndexedModel::shares_errors) {
+            let nats = if indexed.is_some_and(IndexedModel::is_vague) {
                 SHARED_PRUNE_NATS
             } else {
                 PRUNE_NATS

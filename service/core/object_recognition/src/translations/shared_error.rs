@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::indexed_model::IndexedModel;
-use crate::indexed_place::{Across, IndexedPlace};
+use crate::indexed_place::{Across, IndexedPlace, Prediction};
 use crate::level_prior::RatedLevel;
 use crate::translations::touch_update::TouchUpdate;
 use crate::tuning::{ERROR_REACH, SHARED_DEVIATIONS, SHARED_MIN};
@@ -50,8 +50,10 @@ struct SharedLevel {
 pub(crate) struct Conditioned {
     /// Offset of the place from where it was predicted \[m\].
     pub(crate) offset: Vector3<f64>,
-    /// Variance of a touch of it, without the touch's noise, per axis \[m²\].
+    /// Variance of a touch of it along the surface, without the touch's noise, per axis \[m²\].
     pub(crate) variance_m2: f64,
+    /// The same across the surface \[m²\].
+    pub(crate) across_m2: f64,
     /// How far an error of the translation shows across the surface in the offset of a touch.
     pub(crate) shown: f64,
     /// Likelihood of the touch's levels, per that without the earlier contact.
@@ -115,16 +117,23 @@ impl SharedError {
         })
     }
 
+    /// A place about a touch of which none before tells anything.
+    pub(crate) fn unknown(place: &IndexedPlace) -> Conditioned {
+        let own = place.prediction.as_ref();
+        Conditioned {
+            offset: Vector3::zeros(),
+            variance_m2: place.variance_m2,
+            across_m2: own.map_or(place.variance_m2, Prediction::across_m2),
+            shown: 1.0,
+            level_ratio: 1.0,
+        }
+    }
+
     /// A place about the touch; of one that was felt nothing changes. Errors of the position are
     /// shared as far as both surfaces have the same normal, those of levels round edges too.
     pub(crate) fn condition(&self, place: &IndexedPlace) -> Conditioned {
         let Some(prediction) = &place.prediction else {
-            return Conditioned {
-                offset: Vector3::zeros(),
-                variance_m2: place.variance_m2,
-                shown: 1.0,
-                level_ratio: 1.0,
-            };
+            return Self::unknown(place);
         };
         let alike = self.across.common(&prediction.across);
         let gain = alike * self.position.gain * prediction.error_m;
@@ -133,6 +142,7 @@ impl SharedError {
         Conditioned {
             offset: prediction.across.projection * self.offset * gain,
             variance_m2: place.variance_m2 - known,
+            across_m2: prediction.across_m2() - known,
             shown: 1.0 - gain,
             level_ratio: ratios.product(),
         }
@@ -222,9 +232,10 @@ mod tests {
             position: Point3::origin(),
             normal: None,
             variance_m2: 4e-6,
-            prediction: error_m2.map(|error_m2| crate::indexed_place::Prediction {
+            prediction: error_m2.map(|error_m2| Prediction {
                 error_m: error_m2.sqrt(),
                 across: across(normal),
+                bend_m2: 1e-6,
             }),
             levels: Vec::new(),
             descriptors: Vec::new(),

@@ -90,7 +90,9 @@ impl SplitBuffers {
             let place = self.earlier.best(indexed, &point, variance_m2, likely)?;
             SharedError::new(place, touch, *correlation, (&point, variance_m2))
         });
-        if let Some(error) = &shared {
+        let is_predicted = indexed.shares_errors() && densities > 0.0;
+        if is_predicted {
+            let error = shared.as_ref();
             densities = (self.search).conditioned(indexed, error, [prior, noise], candidates);
         }
         let unpredicted = touch.unpredicted(hypothesis.object, indexed, &point, one * densities);
@@ -105,7 +107,7 @@ impl SplitBuffers {
             }
         }
         let least = SPLIT_SHARE_MIN * total;
-        if shared.is_some() {
+        if is_predicted {
             candidates.retain(|candidate| candidate.density >= least);
         } else {
             (self.search).candidates(packed, (least, noise), candidates);

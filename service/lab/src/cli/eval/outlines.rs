@@ -1,9 +1,9 @@
 //! `cogmap-lab eval outlines`.
 
+use std::num::NonZeroUsize;
+
 use clap::{Args, ValueEnum};
-use cogmap_lab::outlines::{
-    Family, Levels, OutlineProtocol, Report, Teaching, Turn, run as explore,
-};
+use cogmap_lab::outlines::{Family, Levels, OutlineProtocol, Teaching, Turn, run as explore};
 
 use super::progress::Progress;
 use cogmap::cli::output;
@@ -23,6 +23,13 @@ pub(in crate::cli) struct OutlinesArgs {
     /// vertical.
     #[arg(long, value_name = "HOW", num_args = 0..=1, default_missing_value = "any")]
     turned: Option<Turned>,
+    /// Families of objects, with commas between; all of them when absent.
+    #[arg(long, value_delimiter = ',', value_name = "NAME", value_parser = family)]
+    families: Vec<Family>,
+    /// Rows at the same time; as many as the machine has processors when absent. It changes nothing
+    /// but the time that it takes.
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
     /// Seed of objects, explorations and noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -40,9 +47,18 @@ enum Turned {
     Yaw,
 }
 
+/// The family of a name.
+fn family(name: &str) -> Result<Family, String> {
+    let of_name = |own: &Family| format!("{own:?}").eq_ignore_ascii_case(name);
+    let names = Family::ALL.map(|own| format!("{own:?}").to_lowercase());
+    let found = Family::ALL.into_iter().find(of_name);
+    found.ok_or_else(|| format!("a family is one of {}", names.join(", ")))
+}
+
 pub(super) fn run(args: &OutlinesArgs) -> anyhow::Result<()> {
     let mut protocols = Vec::new();
-    for family in Family::ALL {
+    let is_asked = |family: &Family| args.families.is_empty() || args.families.contains(family);
+    for family in Family::ALL.into_iter().filter(is_asked) {
         // A line has no normals by which it could be turned back.
         if matches!(args.turned, Some(Turned::Any)) && family == Family::Outline {
             continue;
@@ -68,10 +84,11 @@ pub(super) fn run(args: &OutlinesArgs) -> anyhow::Result<()> {
     let each = |protocol: &OutlineProtocol| 2 * protocol.sets * protocol.objects;
     let explorations: usize = protocols.iter().map(each).sum();
     let progress = Progress::new(explorations as u64, "explorations");
-    let mut report = Report::default();
-    for protocol in &protocols {
-        report.rows.push(explore(protocol, &|| progress.add(1))?);
-    }
+    let threads = args
+        .threads
+        .or_else(|| std::thread::available_parallelism().ok())
+        .unwrap_or(NonZeroUsize::MIN);
+    let report = explore(&protocols, threads, &|| progress.add(1))?;
     progress.finish();
     if args.json {
         return output::json(&report);
