@@ -55,7 +55,7 @@ impl LeftOutErrors {
 impl Body {
     /// The body of the largest likelihood, and the log-likelihood per place, each predicted by the
     /// body of others, as [`Field::learned`](super::field::Field::learned) has it of the places
-    /// around. None of a curve.
+    /// around. None of a curve and of what lies in a plane.
     pub(super) fn fitted(places: &[ModelPlace], graph: &LinkGraph) -> Option<(f64, Self)> {
         if graph.is_curve() {
             return None;
@@ -66,6 +66,9 @@ impl Body {
             .map(|place| place.variance_m2 / (place.count * place.count));
         let noise_m2 = noise.sum::<f64>() / places.len().max(1) as f64;
         let fit = BodyFit::new(&positions, noise_m2);
+        if fit.is_flat() {
+            return None;
+        }
         let found = fit.found();
         let best = found.first()?;
         let errors = left_out(&fit, &found)?;

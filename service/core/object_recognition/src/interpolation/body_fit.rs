@@ -9,7 +9,7 @@ use super::tails;
 use crate::numeric::{bounds, centroid};
 use crate::tuning::{
     BODY_FIRST_STEPS, BODY_KEPT, BODY_LAST_STEPS, BODY_SAMPLES, BODY_STEP_MAX, EXPONENT_LOG,
-    EXPONENT_LOG_RANGE, EXPONENT_LOG_SD, SIZE_LOG_SD, TAPER_MAX, TAPER_SD,
+    EXPONENT_LOG_RANGE, EXPONENT_LOG_SD, SIDE_NOISES, SIZE_LOG_SD, TAPER_MAX, TAPER_SD,
 };
 
 type Parameters = SVector<f64, PARAMETERS>;
@@ -75,14 +75,26 @@ impl<'a> BodyFit<'a> {
         found
     }
 
-    /// Balls, boxes and cylinders along the principal axes of the places, and turned by an eighth.
-    fn starts(&self) -> Vec<Superellipsoid> {
+    /// Whether all places lie in a plane, as far as their noise tells: those of an outline tell no
+    /// body.
+    pub(super) fn is_flat(&self) -> bool {
+        let across_m2 = self.spread().symmetric_eigenvalues().min() / self.places.len() as f64;
+        across_m2 < SIDE_NOISES * SIDE_NOISES * self.least_m2
+    }
+
+    /// Sum of the squares of the offsets from the middle \[m²\].
+    fn spread(&self) -> Matrix3<f64> {
         let middle = centroid(self.places.iter().map(|at| at.coords));
-        let spread = self.places.iter().map(|at| {
+        let squares = self.places.iter().map(|at| {
             let apart = at.coords - middle;
             apart * apart.transpose()
         });
-        let mut axes = spread.sum::<Matrix3<f64>>().symmetric_eigen().eigenvectors;
+        squares.sum()
+    }
+
+    /// Balls, boxes and cylinders along the principal axes of the places, and turned by an eighth.
+    fn starts(&self) -> Vec<Superellipsoid> {
+        let mut axes = self.spread().symmetric_eigen().eigenvectors;
         if axes.determinant() < 0.0 {
             axes = -axes;
         }

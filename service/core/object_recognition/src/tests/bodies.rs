@@ -187,6 +187,23 @@ fn what_stands_on_a_table_is_not_supposed_to_end_where_it_was_not_felt() {
     }
 }
 
+#[test]
+fn an_outline_is_no_body() {
+    for object in 0..40 {
+        let random = |k: u64| uniform(9_000_000 + 10 * object + k);
+        let lobes = (6.0 * random(0)).floor();
+        let points = (0..20_u32).map(|number| {
+            let (sin, cos) =
+                (0.1 * std::f64::consts::PI * (f64::from(number) + random(1))).sin_cos();
+            let radius_m = 0.06 + 0.015 * (lobes * sin.atan2(cos) + 6.0 * random(2)).cos();
+            let point = Point3::new(radius_m * cos, radius_m * sin, 0.0);
+            (1000 * object + u64::from(number), point)
+        });
+        let indexed = IndexedModel::new(&felt_at(points));
+        assert!(indexed.is_vague() || !indexed.shares_errors(), "{object}");
+    }
+}
+
 /// A node has the normal of the side from which the places about it were felt.
 #[test]
 fn nodes_of_a_body_have_normals_where_places_have() {

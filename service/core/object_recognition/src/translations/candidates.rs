@@ -95,8 +95,8 @@ impl CandidateSearch {
         (*density >= least).then(place)
     }
 
-    /// Lists those that were found, after an earlier contact that told of the model's errors, and
-    /// returns the sum of their densities. The variances per axis \[m²\] are those of the
+    /// Lists those that were found in a model of which some were predicted, after an earlier contact
+    /// if it told of the model's errors, and returns the sum of their densities. The variances per axis \[m²\] are those of the
     /// translation and of the touch's noise.
     pub(crate) fn conditioned(
         &self,
