@@ -201,8 +201,8 @@ pub(crate) const BODY_KEPT: usize = 4;
 pub(crate) const BODY_PROBABILITY_MIN: f64 = 0.01;
 /// Last steps of each. Budget.
 pub(crate) const BODY_LAST_STEPS: usize = 30;
-/// Largest change of a turn \[rad\], of the logarithm of a size or an exponent, or of the taper in a
-/// step. Chosen.
+/// Largest change of a turn \[rad\], of the logarithm of a size or an exponent, or of the taper in
+/// a step. Chosen.
 pub(crate) const BODY_STEP_MAX: f64 = 0.5;
 /// Parts of the places that are left out, one after the other. Budget.
 pub(crate) const BODY_FOLDS: usize = 12;

@@ -27,7 +27,7 @@ pub(super) enum Surface {
 impl Fields {
     /// `None` where neighbours tell little of one another, so that between them may be anything,
     /// and of models that have too few or so many places that nothing lies between.
-    /// Where places are dense, `is_dense`, nothing lies between either, but what lies beyond follows.
+    /// Where places are dense, `is_dense`, nothing lies between either; what lies beyond follows.
     pub(crate) fn learned(
         places: &[ModelPlace],
         graph: &LinkGraph,

@@ -7,9 +7,9 @@
 //! own places by leave-one-out cross-validation ([`field`]). Nothing stands between places where
 //! contacts fall on them alone ([`spread`]).
 //!
-//! Few contacts tell the surface better all together: a superellipsoid through them ([`body`]) takes
-//! the part of the places around where it predicts those left out better, and its nodes stand on it
-//! ([`body_nodes`]).
+//! Few contacts tell the surface better all together: a superellipsoid through them ([`body`])
+//! takes the part of the places around where it predicts those left out better, and its nodes stand
+//! on it ([`body_nodes`]).
 
 mod body;
 mod body_fit;

@@ -55,8 +55,9 @@ impl OpenRegion {
     /// was felt all over and without gaps.
     ///
     /// `body_unexpected` is the share of contacts that are not as the model's body predicts, if it
-    /// has one. What is missing of a curve is taken for a straight line over each gap between two of its
-    /// ends; what is missing of a surface for a disc with the circumference of each of its edges.
+    /// has one. What is missing of a curve is taken for a straight line over each gap between two
+    /// of its ends; what is missing of a surface for a disc with the circumference of each of its
+    /// edges.
     pub(crate) fn new(
         positions: &[Point3<f64>],
         felt: usize,

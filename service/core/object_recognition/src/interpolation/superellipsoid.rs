@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Point3, SVector, UnitQuaternion, Vector3};
 
-/// Numbers of a superellipsoid: three each of place, turn and size, the logarithms of two exponents,
-/// and its taper.
+/// Numbers of a superellipsoid: three each of place, turn and size, the logarithms of two
+/// exponents, and its taper.
 pub(super) const PARAMETERS: usize = 12;
 /// Least width of a tapered body, per that at its middle: beyond its tip there is none.
 const WIDTH_MIN: f64 = 0.05;
@@ -50,8 +50,8 @@ pub(super) struct AreaLog {
 
 /// Area of the unit ball, per sum of bc, ca and ab of its half sizes.
 const ELLIPSOID_AREA: f64 = 4.0 * std::f64::consts::PI / 3.0;
-/// By how much of that a surface grows as the first and the second exponent go from two to infinity:
-/// 1.5 for a cylinder, and 24/4π for a box.
+/// By how much of that a surface grows as the first and the second exponent go from two to
+/// infinity: 1.5 for a cylinder, and 24/4π for a box.
 const ROUND_TO_FLAT: [f64; 2] = [0.273_24, 0.5];
 
 /// The norm (|a|ᵖ + |b|ᵖ)^(1/p), its slopes by both, and by ln p.
@@ -164,7 +164,7 @@ impl Superellipsoid {
         }
     }
 
-    /// A point of it: the one in this direction along its axes, in half sizes, before it is tapered.
+    /// A point of it: in this direction along its axes, in half sizes, before it is tapered.
     pub(super) fn point(&self, direction: &Vector3<f64>) -> Point3<f64> {
         let [p, q] = self.exponent_logs.map(f64::exp);
         let (round, ..) = norm([direction.x, direction.y], p);

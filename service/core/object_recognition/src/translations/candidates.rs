@@ -95,9 +95,9 @@ impl CandidateSearch {
         (*density >= least).then(place)
     }
 
-    /// Lists those that were found in a model of which some were predicted, after an earlier contact
-    /// if it told of the model's errors, and returns the sum of their densities. The variances per axis \[m²\] are those of the
-    /// translation and of the touch's noise.
+    /// Lists those that were found in a model of which some were predicted, after an earlier
+    /// contact if it told of the model's errors, and returns the sum of their densities. The
+    /// variances per axis \[m²\] are those of the translation and of the touch's noise.
     pub(crate) fn conditioned(
         &self,
         indexed: &IndexedModel,
