@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_4, TAU};
 
-use nalgebra::{Matrix3, Point3, SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::superellipsoid::{PARAMETERS, Superellipsoid};
 use super::tails;
@@ -98,7 +98,8 @@ impl<'a> BodyFit<'a> {
         if axes.determinant() < 0.0 {
             axes = -axes;
         }
-        let principal = UnitQuaternion::from_matrix(&axes);
+        let principal = Rotation3::from_matrix_unchecked(axes);
+        let principal = UnitQuaternion::from_rotation_matrix(&principal);
         let turns = [
             Vector3::zeros(),
             FRAC_PI_4 * Vector3::x(),
