@@ -1,14 +1,17 @@
 //! A model with its indexes, ready for recognition.
 
+use std::sync::Arc;
+
 use nalgebra::Point3;
 
 use crate::index::packed_places::PackedPlaces;
 use crate::indexed_place::IndexedPlace;
 use crate::interpolation::{
-    Fields, LinkGraph, OpenRegion, Spread, UnpredictedGaps, interpolated, missed_share,
+    FieldVariants, Fields, LinkGraph, OpenRegion, Spread, UnpredictedGaps, interpolated,
+    missed_share,
 };
 use crate::level_prior::{LevelPrior, object_levels, without_unusual_levels};
-use crate::model::ObjectModel;
+use crate::model::{ModelPlace, ObjectModel};
 use crate::numeric::{centroid, floor_u32};
 use crate::surfels::map::SurfelMap;
 
@@ -42,27 +45,48 @@ pub(crate) struct IndexedModel {
     /// Where it goes on beyond what was felt; none of one that was felt all over.
     pub(crate) open: Option<OpenRegion>,
     /// The surface, if the places have normals.
-    pub(crate) surfel_map: Option<SurfelMap>,
+    pub(crate) surfel_map: Option<Arc<SurfelMap>>,
     has_body: bool,
+    /// By how much the places of a body are likelier chosen than random ones \[nats\].
+    pub(crate) chosen_log: Option<f64>,
     shares: [f64; SHARE_BINS + 1],
 }
 
 impl IndexedModel {
-    /// Of a model.
-    pub(crate) fn new(model: &ObjectModel) -> Self {
-        let spacing_m = model.spacing_m();
+    /// The variants of a model: by what its places tell, and by the body through them, if it is
+    /// uncertain whether anything lies between them.
+    pub(crate) fn variants(model: &ObjectModel) -> (Self, Option<Self>) {
         let felt: Vec<_> = { model.places().iter() }
             .map(|place| place.position_m)
             .collect();
         let graph = LinkGraph::new(&felt);
         let usual = without_unusual_levels(model.places());
-        let fields = Fields::learned(&usual, &graph, graph.is_dense(spacing_m));
+        let spacing_m = model.spacing_m();
         let spread = Spread::learned(model.places(), &graph, spacing_m);
-        let between = fields.as_ref().filter(|_| spread == Spread::Even);
+        let fields = FieldVariants::learned(&usual, &graph, (spread, spacing_m));
+        let surfel_map = SurfelMap::new(model).map(Arc::new);
+        let of = |fields| Self {
+            surfel_map: surfel_map.clone(),
+            ..Self::new(model, (&felt, &graph, spread), &usual, fields)
+        };
+        let body = fields.body.as_ref().map(|body| of(Some(body)));
+        (of(fields.places.as_ref()), body)
+    }
+
+    /// Of a model that has such fields between its places, which have these links and on which
+    /// contacts fall so; `usual` are the places without unusual levels. The surface is left out.
+    fn new(
+        model: &ObjectModel,
+        (felt, graph, spread): (&[Point3<f64>], &LinkGraph, Spread),
+        usual: &[ModelPlace],
+        fields: Option<&Fields>,
+    ) -> Self {
+        let spacing_m = model.spacing_m();
+        let between = fields.filter(|_| spread == Spread::Even);
         // On a surface contacts fall up to half a link beside a place, or half the step of nodes.
         let is_surface = between.is_some() && !graph.is_curve();
         let field_m = |own| {
-            let link_m = graph.mean_link_m(own, &felt).filter(|_| is_surface);
+            let link_m = graph.mean_link_m(own, felt).filter(|_| is_surface);
             let width_m = link_m.map_or(spacing_m, |link_m| {
                 link_m.clamp(spacing_m, NODE_STEP * spacing_m)
             });
@@ -82,10 +106,13 @@ impl IndexedModel {
             })
             .collect();
         if let Some(fields) = between {
-            let nodes = interpolated(&usual, &graph, fields, spacing_m);
+            let nodes = interpolated(usual, graph, fields, spacing_m);
             places.extend(nodes);
         }
-        let has_body = between.is_some_and(|fields| fields.body().is_some());
+        let body = fields.and_then(Fields::body);
+        let body = body.filter(|_| between.is_some());
+        let chosen_log = body.and_then(|body| body.chosen_log);
+        let has_body = body.is_some();
         let positions: Vec<_> = places.iter().map(|place| place.position).collect();
         let middle = centroid(positions.iter().map(|position| position.coords));
         let radius_m = positions
@@ -97,15 +124,15 @@ impl IndexedModel {
             packed: PackedPlaces::new(&places, spacing_m, extent_m, model.noise_m2()),
             shares: shares(&positions, extent_m),
             gaps: (fields.is_none() && spread == Spread::Even)
-                .then(|| UnpredictedGaps::new(&felt, &graph, spacing_m))
+                .then(|| UnpredictedGaps::new(felt, graph, spacing_m))
                 .flatten(),
-            open: fields.as_ref().and_then(|fields| {
+            open: fields.and_then(|fields| {
                 let unexpected = fields.body().map(|body| body.unexpected);
                 let felt = felt.len();
-                OpenRegion::new(&positions, felt, &graph, (spread, spacing_m), unexpected)
+                OpenRegion::new(&positions, felt, graph, (spread, spacing_m), unexpected)
             }),
             area_m2: positions.len() as f64 * spacing_m * spacing_m,
-            surfel_map: SurfelMap::new(model),
+            surfel_map: None,
             extent_m,
             gap_m: graph.typical_m,
             spacing_m,
@@ -114,6 +141,7 @@ impl IndexedModel {
             missed_share: (spread == Spread::OnPlaces).then(|| missed_share(model.places())),
             own_levels: object_levels(places.iter().flat_map(|place| &place.levels)),
             has_body,
+            chosen_log,
             places,
         }
     }

@@ -21,6 +21,7 @@ mod surfels;
 mod tests;
 mod translations;
 mod tuning;
+mod variant;
 mod z_score;
 
 pub use contact::{Contact, DescriptorReading, LevelReading, Reached};

@@ -11,16 +11,18 @@ use crate::level_prior::{LevelPrior, level_prior};
 use crate::model::ObjectModel;
 use crate::surfels::map::PerceptContext;
 use crate::tuning::{ANSWER_PROBABILITY, BACKGROUND_SAMPLES};
+use crate::variant::{Variant, VariantId, body_priors};
 
 /// Number of an object, chosen by the caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ObjectId(pub u32);
 
-/// One model with its indexes.
+/// One model with the indexes of its variants.
 #[derive(Debug)]
-pub(crate) struct LibraryEntry {
+struct LibraryEntry {
     model: ObjectModel,
-    pub(crate) indexed: IndexedModel,
+    places: Arc<IndexedModel>,
+    body: Option<Arc<IndexedModel>>,
 }
 
 /// How densely an object was felt.
@@ -47,7 +49,7 @@ impl Density {
 /// A place of the library.
 #[derive(Clone, Debug)]
 pub(crate) struct Sample {
-    pub(crate) object: ObjectId,
+    pub(crate) of: VariantId,
     /// Number among the model's packed places.
     pub(crate) packed_place: u32,
     pub(crate) position: Point3<f64>,
@@ -62,6 +64,8 @@ pub struct ObjectLibrary {
     answer_probability: f64,
     /// Shared with the library's clones, so that a snapshot costs a pointer per object.
     objects: BTreeMap<ObjectId, Arc<LibraryEntry>>,
+    /// Logs of the prior probabilities of the bodies that are uncertain.
+    body_priors: BTreeMap<ObjectId, f64>,
     level_prior: Vec<LevelPrior>,
     samples: Vec<Sample>,
     extent_m: f64,
@@ -79,6 +83,7 @@ impl ObjectLibrary {
         Self {
             answer_probability,
             objects: BTreeMap::new(),
+            body_priors: BTreeMap::new(),
             level_prior: Vec::new(),
             samples: Vec::new(),
             extent_m: 0.0,
@@ -93,26 +98,36 @@ impl ObjectLibrary {
     /// Puts a model in place of an earlier one of the same object. Running episodes keep the
     /// evidence that they have.
     pub fn put(&mut self, id: ObjectId, model: ObjectModel) {
-        let indexed = IndexedModel::new(&model);
-        self.objects
-            .insert(id, Arc::new(LibraryEntry { model, indexed }));
+        let (places, body) = IndexedModel::variants(&model);
+        let entry = LibraryEntry {
+            model,
+            places: Arc::new(places),
+            body: body.map(Arc::new),
+        };
+        self.objects.insert(id, Arc::new(entry));
+        self.update_priors();
         self.update_summary();
     }
 
     /// Removes an object; `true` if there was one.
     pub fn remove(&mut self, id: ObjectId) -> bool {
         let removed = self.objects.remove(&id).is_some();
+        self.update_priors();
         self.update_summary();
         removed
     }
 
-    /// A library of some of these objects, each under a new number.
+    /// A library of some of these objects, each under a new number; what is supposed of them stays.
     #[must_use]
     pub fn select(&self, objects: impl IntoIterator<Item = (ObjectId, ObjectId)>) -> Self {
         let mut selected = Self::answering_from(self.answer_probability);
         for (id, number) in objects {
             if let Some(object) = self.objects.get(&id) {
                 selected.objects.insert(number, Arc::clone(object));
+                let prior_log = self.body_priors.get(&id);
+                selected
+                    .body_priors
+                    .extend(prior_log.map(|log| (number, *log)));
             }
         }
         selected.update_summary();
@@ -127,11 +142,11 @@ impl ObjectLibrary {
     /// How densely an object was felt.
     pub fn density(&self, id: ObjectId) -> Option<Density> {
         let object = self.objects.get(&id)?;
-        let gap_m = object.indexed.gap_m;
+        let gap_m = object.places.gap_m;
         (gap_m > 0.0).then(|| Density {
             gap_m,
             contact_sd_m: object.model.noise_m2().sqrt(),
-            between_sd_m: object.indexed.between_sd_m,
+            between_sd_m: self.likelier(id).and_then(|(_, own)| own.between_sd_m),
         })
     }
 
@@ -150,46 +165,99 @@ impl ObjectLibrary {
         self.objects.is_empty()
     }
 
+    fn update_priors(&mut self) {
+        let chosen_logs = { self.objects.iter() }.filter_map(|(id, object)| {
+            let body = object.body.as_ref().unwrap_or(&object.places);
+            Some((*id, body.chosen_log?))
+        });
+        let mut body_priors = body_priors(chosen_logs);
+        body_priors.retain(|id, _| self.objects[id].body.is_some());
+        self.body_priors = body_priors;
+    }
+
     fn update_summary(&mut self) {
-        let extents = self.indexed_models().map(|(_, indexed)| indexed.extent_m);
+        let extents = self.variants().map(|(_, indexed)| indexed.extent_m);
         self.extent_m = extents.fold(0.0, f64::max);
         let places = || {
-            self.indexed_models().flat_map(|(object, indexed)| {
+            self.likelier_models().flat_map(|(of, indexed)| {
                 let count = u32::try_from(indexed.places.len()).unwrap_or(u32::MAX);
-                (0..count).map(move |place| (object, place))
+                (0..count).map(move |place| (of, place))
             })
         };
         let step = places().count().div_ceil(BACKGROUND_SAMPLES).max(1);
         let samples = places().skip(step / 2).step_by(step);
-        let sample = |(object, packed_place): (ObjectId, u32)| {
-            let indexed = self.indexed(object)?;
+        let sample = |(of, packed_place): (VariantId, u32)| {
+            let indexed = self.variant(of)?;
             let place = indexed
                 .places
                 .get(indexed.packed.place(packed_place as usize))?;
             Some(Sample {
-                object,
+                of,
                 packed_place,
                 position: place.position,
             })
         };
         self.samples = samples.filter_map(sample).collect();
-        let models = self.objects.values().map(|object| &object.indexed);
+        let models = self.likelier_models().map(|(_, indexed)| indexed);
         let prior = level_prior(models.flat_map(|indexed| &indexed.own_levels));
         self.level_prior = prior;
     }
 
-    pub(crate) fn all(&self) -> impl Iterator<Item = (ObjectId, &Arc<LibraryEntry>)> {
-        self.objects.iter().map(|(id, object)| (*id, object))
-    }
-
+    /// All objects, as their places tell.
     pub(crate) fn indexed_models(&self) -> impl Iterator<Item = (ObjectId, &IndexedModel)> {
         self.objects
             .iter()
-            .map(|(id, object)| (*id, &object.indexed))
+            .map(|(id, object)| (*id, &*object.places))
     }
 
+    /// An object, as its places tell.
     pub(crate) fn indexed(&self, id: ObjectId) -> Option<&IndexedModel> {
-        self.objects.get(&id).map(|object| &object.indexed)
+        self.objects.get(&id).map(|object| &*object.places)
+    }
+
+    /// The variants of all objects with which an episode begins, by number.
+    pub(crate) fn variants(&self) -> impl Iterator<Item = (VariantId, &Arc<IndexedModel>)> {
+        self.objects.iter().flat_map(|(id, object)| {
+            let body = object.body.as_ref();
+            let body = body.filter(|_| self.body_priors.contains_key(id));
+            let [places_id, body_id] = VariantId::both(*id);
+            let body = body.map(|body| (body_id, body));
+            [(places_id, &object.places)].into_iter().chain(body)
+        })
+    }
+
+    /// A variant of an object. A body that is none any more is what the places tell by now.
+    pub(crate) fn variant(&self, id: VariantId) -> Option<&IndexedModel> {
+        let object = self.objects.get(&id.object)?;
+        let body = object.body.as_ref();
+        let body = body.filter(|_| id.variant == Variant::Body);
+        Some(body.unwrap_or(&object.places))
+    }
+
+    /// The likelier variant of each object.
+    pub(crate) fn likelier_models(&self) -> impl Iterator<Item = (VariantId, &IndexedModel)> {
+        self.objects.keys().filter_map(|id| self.likelier(*id))
+    }
+
+    fn likelier(&self, object: ObjectId) -> Option<(VariantId, &IndexedModel)> {
+        let [places, body] = VariantId::both(object);
+        let prior_log = self.body_priors.get(&object);
+        let is_body = prior_log.is_some_and(|log| *log > 0.5_f64.ln());
+        let id = if is_body { body } else { places };
+        Some((id, self.variant(id)?))
+    }
+
+    /// Logs of the prior probabilities of these variants, given their objects.
+    pub(crate) fn variant_priors(&self) -> BTreeMap<VariantId, f64> {
+        let prior_log = |(id, _): (VariantId, _)| {
+            let body_log = self.body_priors.get(&id.object).copied();
+            let log = match id.variant {
+                Variant::Places => body_log.map_or(0.0, |log| (-log.exp_m1()).ln()),
+                Variant::Body => body_log.unwrap_or(f64::NEG_INFINITY),
+            };
+            (id, log)
+        };
+        self.variants().map(prior_log).collect()
     }
 
     /// What the densities of contacts with a model depend on beside its surfels.

@@ -4,8 +4,9 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use crate::contact::Contact;
 use crate::indexed_model::IndexedModel;
-use crate::library::{ObjectId, ObjectLibrary};
+use crate::library::ObjectLibrary;
 use crate::tuning::{GAIN_NATS_MAX, POSE_WORTH, RIVAL_WEIGHT_MIN, RIVALS_MAX, SITES_MAX};
+use crate::variant::VariantId;
 
 /// A touch with its expected information.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +22,7 @@ pub struct NextTouch {
 /// A hypothesis with its share of all mass.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WeightedPose {
-    pub(crate) object: ObjectId,
+    pub(crate) of: VariantId,
     pub(crate) map_from_episode: Isometry3<f64>,
     pub(crate) weight: f64,
 }
@@ -43,7 +44,7 @@ pub(crate) fn next_touch(
     }
     let mut best: Option<NextTouch> = None;
     for own in &chosen {
-        let Some(indexed) = library.indexed(own.object) else {
+        let Some(indexed) = library.variant(own.of) else {
             continue;
         };
         let back = own.map_from_episode.inverse();
@@ -69,7 +70,9 @@ fn choose(mut rivals: Vec<WeightedPose>) -> Vec<WeightedPose> {
     let mut chosen: Vec<WeightedPose> = Vec::with_capacity(RIVALS_MAX);
     for is_first in [true, false] {
         for rival in &rivals {
-            let is_known = chosen.iter().any(|other| other.object == rival.object);
+            let is_known = chosen
+                .iter()
+                .any(|other| other.of.object == rival.of.object);
             let same = |other: &WeightedPose| other.map_from_episode == rival.map_from_episode;
             if chosen.len() < RIVALS_MAX && is_known != is_first && !chosen.iter().any(same) {
                 chosen.push(*rival);
@@ -90,13 +93,13 @@ fn gain_nats(
 ) -> f64 {
     let here = log(library, indexed, own, touch);
     let gains = rivals.iter().map(|other| {
-        let worth = if other.object == own.object {
+        let worth = if other.of.object == own.of.object {
             POSE_WORTH
         } else {
             1.0
         };
         let there = library
-            .indexed(other.object)
+            .variant(other.of)
             .map_or(here, |indexed| log(library, indexed, other, touch));
         other.weight * worth * (here - there).clamp(0.0, GAIN_NATS_MAX)
     });

@@ -20,6 +20,8 @@ pub(crate) const LANES: usize = 8;
 pub(crate) struct ContactPercepts<'a> {
     pub(crate) contact: &'a Contact,
     levels: Vec<Level>,
+    /// Factor of the variances of a place's levels.
+    counted: f64,
 }
 
 /// A level on a channel of the library.
@@ -47,7 +49,12 @@ enum PerceptForm {
     /// No percept on a channel of the model.
     Nothing,
     /// One level, less the median of the model's.
-    Level { value: f32, noise: f32, scale: f32 },
+    Level {
+        value: f32,
+        noise: f32,
+        scale: f32,
+        counted: f32,
+    },
     /// Several percepts: each place's own lists are read.
     Several,
 }
@@ -88,7 +95,13 @@ impl<'a> ContactPercepts<'a> {
         Self {
             contact,
             levels: contact.levels.iter().filter_map(level).collect(),
+            counted: 1.0,
         }
+    }
+
+    /// The same, with so many times the variances of the levels of places.
+    pub(crate) fn counting(self, counted: f64) -> Self {
+        Self { counted, ..self }
     }
 
     /// Against the places of a model, turned by `rotation`.
@@ -97,7 +110,11 @@ impl<'a> ContactPercepts<'a> {
         indexed: &'a IndexedModel,
         rotation: &UnitQuaternion<f64>,
     ) -> PerceptLikelihood<'a> {
-        let Self { contact, levels } = self;
+        let Self {
+            contact,
+            levels,
+            counted,
+        } = self;
         let kind = match indexed.packed.levels() {
             _ if levels.is_empty() && contact.descriptors.is_empty() => PerceptForm::Nothing,
             None => PerceptForm::Several,
@@ -107,6 +124,7 @@ impl<'a> ContactPercepts<'a> {
                     value: packed_reading(level.value - middle),
                     noise: packed_level_variance(level.noise),
                     scale: to_f32(level.scale),
+                    counted: to_f32(*counted),
                 }),
         };
         let variance = contact.normal_sd_rad * contact.normal_sd_rad + NORMAL_VARIANCE;
@@ -135,9 +153,10 @@ impl PerceptLikelihood<'_> {
                 value,
                 noise,
                 scale,
+                counted,
             } => level_likelihood(
                 value - packed_place.level,
-                packed_place.level_variance + noise,
+                counted * packed_place.level_variance + noise,
                 *scale,
             ),
             PerceptForm::Several => self.place_likelihood(number),
@@ -166,6 +185,7 @@ impl PerceptLikelihood<'_> {
                     value,
                     noise,
                     scale,
+                    counted,
                 },
                 None,
             ) => {
@@ -179,7 +199,8 @@ impl PerceptLikelihood<'_> {
                 for ((likelihood, level), variance) in
                     likelihoods.iter_mut().zip(&levels).zip(&variances)
                 {
-                    *likelihood = level_likelihood(value - level, variance + noise, *scale);
+                    *likelihood =
+                        level_likelihood(value - level, counted * variance + noise, *scale);
                 }
             }
             _ => {
@@ -207,6 +228,7 @@ impl PerceptLikelihood<'_> {
                 value,
                 noise,
                 scale,
+                counted,
             } => {
                 let out = &mut out[..];
                 simd::dispatch(
@@ -215,7 +237,8 @@ impl PerceptLikelihood<'_> {
                         for ((likelihood, level), variance) in
                             out.iter_mut().zip(levels).zip(variances)
                         {
-                            *likelihood = level_likelihood(value - level, variance + noise, scale);
+                            *likelihood =
+                                level_likelihood(value - level, counted * variance + noise, scale);
                         }
                     },
                 );
@@ -254,7 +277,10 @@ impl PerceptLikelihood<'_> {
         let ratios = self.percepts.levels.iter().filter_map(|level| {
             let of_channel = |own: &&LevelMemory| own.channel == level.channel;
             let own = place.levels.iter().find(of_channel)?;
-            let (apart, variance) = (level.value - own.mean, own.variance() + level.noise);
+            let (apart, variance) = (
+                level.value - own.mean,
+                self.percepts.counted * own.variance() + level.noise,
+            );
             let here = (-0.5 * apart * apart / variance).exp() / variance.sqrt();
             Some(level.scale * here + WRONG_PERCEPT_SHARE)
         });
@@ -335,7 +361,7 @@ mod tests {
                 });
                 let settings = ModelSettings::default();
                 let model = ObjectModel::with_places(settings, 0.004, places.collect());
-                IndexedModel::new(&model)
+                IndexedModel::variants(&model).0
             })
             .collect();
         let level_prior = level_prior(indexed_models.iter().flat_map(|own| &own.own_levels));
@@ -391,7 +417,7 @@ mod tests {
                 descriptors: Vec::new(),
             };
             let model = ObjectModel::with_places(ModelSettings::default(), 0.004, vec![place]);
-            let indexed = IndexedModel::new(&model);
+            let indexed = IndexedModel::variants(&model).0;
             let levels = [level(0, -1.0), level(0, 3.0)];
             let level_prior = level_prior(object_levels(levels.iter()).iter());
             let contact = |value| Contact::at(Point3::origin(), 0.001).with_level(0, value, 0.1);

@@ -10,6 +10,7 @@ use super::{
 };
 use crate::numeric::log_sum;
 use crate::translations::GaussianSum;
+use crate::variant::{Variant, VariantId};
 
 mod bodies;
 mod levels;
@@ -281,7 +282,12 @@ fn the_evidence_is_that_of_all_assignments_of_contacts_to_places() {
                 None,
             );
             let contacts = &contacts[..=count];
-            let found = |id: u32| translations.object_logs()[&ObjectId(id)];
+            let found = |id: u32| {
+                translations.variant_logs()[&VariantId {
+                    object: ObjectId(id),
+                    variant: Variant::Places,
+                }]
+            };
             let told = |id: u32| by_assignment(&library, id, &rotations, contacts);
             let (one, two) = (told(1), told(2));
             let best = one.max(two);

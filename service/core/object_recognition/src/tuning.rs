@@ -1,4 +1,5 @@
-//! Every number of the recogniser that somebody chose, with unit, meaning and source.
+//! Every number of the recogniser that somebody chose, with unit, meaning and source; those of what
+//! lies between places are in [`interpolation::tuning`](crate::interpolation).
 //!
 //! The last word of each comment says where the value comes from:
 //!
@@ -83,30 +84,6 @@ pub(crate) const SPARSE_RATIOS: [usize; 2] = [16, 4];
 
 // What lies between places.
 
-/// Nearest places among which links are sought. Budget.
-pub(crate) const LINK_NEIGHBOURS: usize = 16;
-/// Radius of the ball about the middle of a link that holds no other place, per half its length:
-/// below one, so that few faces of a surface are without a diagonal. A curve that turns by less
-/// than 74° at a place has no link past it. Chosen.
-pub(crate) const LINK_BALL: f64 = 0.75;
-/// Longest link, per typical one: beyond, nothing was explored. Gaps between places that are drawn
-/// at random all over a surface are rarely longer. Chosen.
-pub(crate) const LINK_LENGTH_MAX: f64 = 4.0;
-/// Angle between neighbouring links of a surface's place beyond which the surface may be open there
-/// \[rad\]: 160°. Chosen.
-pub(crate) const OPEN_SURFACE_RAD: f64 = 2.8;
-/// Distance from all that was felt beyond which nothing was explored, in typical links. Chosen.
-pub(crate) const EXPLORED_REACH: f64 = 3.0;
-/// Places about a hole in a surface, at least: a smaller one hides nothing. Chosen.
-pub(crate) const RIM_MIN: usize = 5;
-/// Links along a curve within which it leads on, or ends. Chosen.
-pub(crate) const END_LINKS: usize = 3;
-/// Cosine of the angle between two directions along a curve below which one leads on where the
-/// other came from: 104°. Chosen.
-pub(crate) const OPEN_CURVE_COS: f64 = -0.25;
-/// Share of the variance of places across a plane below which they lie in it: a seventh of the
-/// deviation. Chosen.
-pub(crate) const FLAT_SHARE: f64 = 0.02;
 /// Least correlation of the errors at two contacts by which the one tells of the other. Chosen.
 pub(crate) const SHARED_MIN: f64 = 0.05;
 /// Least density of a place, per that of the likeliest, that an earlier contact may make likely: of
@@ -125,119 +102,15 @@ pub(crate) const ERROR_REACH: f64 = 0.35;
 /// The same where they speak for an unknown object: about one gap, so that it is named late rather
 /// than wrongly. Chosen.
 pub(crate) const UNKNOWN_ERROR_REACH: f64 = 1.0;
-/// Least share of an object that counts as not explored. Chosen.
-pub(crate) const UNEXPLORED_MIN: f64 = 0.05;
+/// Least variance of the difference of what is predicted at two places, per that of one. Chosen:
+/// at one point both are the same.
+pub(crate) const APART_MIN: f64 = 1e-3;
 /// Objects against each of which an unknown one has to be earned, the likeliest. Budget.
 pub(crate) const EARNED_MAX: usize = 6;
-/// Share of contacts between places that are not as predicted: a corner, an edge or the end of a
-/// pattern may lie there. Chosen.
-pub(crate) const UNEXPECTED_SHARE: f64 = 0.5;
-/// Prior probability that an object with an open edge was felt in part only: others have an edge of
-/// their own. Chosen.
-pub(crate) const PARTIAL_PRIOR: f64 = 0.1;
 /// Least probability that a contact is the first one on what was explored. Chosen.
 pub(crate) const ENTER_MIN: f64 = 0.01;
-/// Mean length of what is missing of such an object, per that of what was felt. Chosen.
-pub(crate) const MISSING_PER_KNOWN: f64 = 0.5;
-/// Distance from where it begins at which a walk may enter what was explored, in typical links.
-/// Chosen.
-pub(crate) const ENTRY_REACH: f64 = 1.5;
-/// Places by which it may be entered. Budget.
-pub(crate) const ENTRIES_MAX: usize = 64;
-/// Places by which a curve or a surface is predicted. Budget.
-pub(crate) const KRIGING_CURVE: usize = 6;
-/// See [`KRIGING_CURVE`].
-pub(crate) const KRIGING_SURFACE: usize = 12;
-/// Neighbours of a place of which two span a plane with it. Budget.
-pub(crate) const SIDE_PAIRS: usize = 8;
-/// Such planes that are fitted to the places by them, the best. Budget.
-pub(crate) const SIDE_FITTED: usize = 4;
-/// Fits of each. Budget.
-pub(crate) const SIDE_FITS: usize = 2;
-/// Distance from a plane within which a neighbour lies by it, in typical links: a surface that
-/// turns by 9° over a link leaves its tangent plane so far. Chosen.
-pub(crate) const SIDE_REACH: f64 = 0.08;
-/// The same in deviations of a contact: it is as large as the larger of both. Chosen.
-pub(crate) const SIDE_NOISES: f64 = 3.0;
-/// Weight of a neighbour straight above a plane that has as many below, in neighbours by it: a
-/// plane through the body is no tangent plane. Chosen.
-pub(crate) const SIDE_THROUGH: f64 = 8.0;
-/// Cosine of the angle between the normals of two places of one side: 45°. Chosen.
-pub(crate) const SIDE_COS: f64 = 0.707;
-/// Sine of the angle between the tangent plane and the way to a place of the same side: half of
-/// 45°, as on a circle. Derived.
-pub(crate) const SIDE_OFFSET: f64 = 0.383;
-/// Places by which a field is learned: its variance is then good to a seventh. Budget.
-pub(crate) const FIELD_SAMPLES: usize = 96;
-/// Lengths of a field that are tried, in typical links. Chosen.
-pub(crate) const FIELD_LENGTHS: [f64; 4] = [0.7, 1.5, 3.0, 6.0];
-/// Noise of a field that is tried, per its variance. Chosen.
-pub(crate) const FIELD_NOISES: [f64; 4] = [1e-4, 1e-2, 0.1, 1.0];
-/// Fewer places tell nothing of what lies between and beyond them: of twenty contacts some fall on
-/// one place. Chosen.
-pub(crate) const BETWEEN_MIN: usize = 16;
-/// Log-likelihood ratio of all levels of a model, each predicted by its neighbours, against levels
-/// that have nothing to do with them: less says little of what lies beside a place \[nats\].
-/// Chosen.
-pub(crate) const PREDICTED_NATS: f64 = 10.0;
-/// The same of a model whose contacts were not at chosen points: whoever touches it again does so
-/// between them. Chosen.
-pub(crate) const PREDICTED_AT_RANDOM_NATS: f64 = 5.0;
-/// Degrees of freedom of the errors of a field: few are far larger than the rest. Chosen.
-pub(crate) const TAILS: f64 = 4.0;
-/// By how much a body through all places must be likelier than what the places around tell, each
-/// place predicted by others \[nats\]. Chosen.
-pub(crate) const BODY_NATS: f64 = 5.0;
-/// Deviations by which the distances of places differ from those of random ones, from which on they
-/// are taken for chosen ones. Chosen.
-pub(crate) const RANDOM_SDS: f64 = 2.0;
-/// Places by which the first steps to a body are made. Budget.
-pub(crate) const BODY_SAMPLES: usize = 128;
-/// First steps from each start. Budget.
-pub(crate) const BODY_FIRST_STEPS: usize = 6;
-/// Bodies of these that are kept. Budget.
-pub(crate) const BODY_KEPT: usize = 4;
-/// Least probability of one beside the best that is looked at. Chosen.
-pub(crate) const BODY_PROBABILITY_MIN: f64 = 0.01;
-/// Last steps of each. Budget.
-pub(crate) const BODY_LAST_STEPS: usize = 30;
-/// Largest change of a turn \[rad\], of the logarithm of a size or an exponent, or of the taper in
-/// a step. Chosen.
-pub(crate) const BODY_STEP_MAX: f64 = 0.5;
-/// Parts of the places that are left out, one after the other. Budget.
-pub(crate) const BODY_FOLDS: usize = 12;
-/// Steps without each. Budget.
-pub(crate) const BODY_FOLD_STEPS: usize = 8;
-/// Deviations from a body beyond which a place is not as it predicts. Chosen.
-pub(crate) const BODY_MISSED_SDS: f64 = 4.0;
-/// Logarithm of a body's exponents, as expected: 3.3, between an ellipsoid and a box. Chosen.
-pub(crate) const EXPONENT_LOG: f64 = 1.2;
-/// Its standard deviation. Chosen.
-pub(crate) const EXPONENT_LOG_SD: f64 = 1.0;
-/// Range of it: from a body with pinched edges to one whose edges are as sharp as can be felt.
-/// Chosen.
-pub(crate) const EXPONENT_LOG_RANGE: [f64; 2] = [0.3, 3.7];
-/// Standard deviation of the logarithm of a body's sizes. Chosen.
-pub(crate) const SIZE_LOG_SD: f64 = 1.0;
-/// Standard deviation of a body's taper. Chosen.
-pub(crate) const TAPER_SD: f64 = 0.3;
-/// Largest taper: a body with a tip. Chosen.
-pub(crate) const TAPER_MAX: f64 = 0.95;
-/// Points of a body of which nodes are chosen. Budget.
-pub(crate) const BODY_POINTS: u32 = 16_384;
-/// Points of a body by which is told whether all of it was felt. Budget.
-pub(crate) const SIDE_SAMPLES: u32 = 4_096;
-/// Least distance of these, per half its mean size. Budget.
-pub(crate) const SIDE_SAMPLES_APART: f64 = 0.15;
-/// Cosine of the angle between the normals on one side of a body and its axis, at least: 37°, so
-/// that edges are on no side. Chosen.
-pub(crate) const SIDE_NORMAL_COS: f64 = 0.8;
-/// Least probability of so few places on one side of a body as there are. Chosen.
-pub(crate) const SIDE_PROBABILITY_MIN: f64 = 0.01;
-/// Least distance of two nodes on a body, in steps. Chosen.
-pub(crate) const BODY_APART: f64 = 0.85;
-/// Places whose errors scale the variance of a field around. Chosen.
-pub(crate) const ERROR_NEIGHBOURS: usize = 6;
+/// Probability below which a variant of an object is dropped. Chosen.
+pub(crate) const VARIANT_PROBABILITY_MIN: f64 = 0.01;
 /// Share of contacts that fall evenly over a surface, and not on its places alone, below which
 /// nothing stands between these; so many may lie there all the same. Hands that feel a surface
 /// anywhere have a share from a third to one, those that reach for the same points again less than
@@ -246,29 +119,11 @@ pub(crate) const EVEN_SHARE_MIN: f64 = 0.25;
 /// Prior probability that an object which was taught at the same points again is felt elsewhere
 /// too. Chosen.
 pub(crate) const ELSEWHERE_PRIOR: f64 = 0.1;
-/// Nodes and places of a model: a model with more places has no nodes. Budget.
-pub(crate) const NODES_MAX: usize = 1024;
-/// Typical link of a surface, in spacings, up to which it needs no nodes: places that are kept
-/// apart by a spacing lie so far from one another, across the diagonals of a square too. Chosen.
-pub(crate) const DENSE_LINK: f64 = 1.5;
-/// A contact is in a gap of which nothing is predicted if it is farther from every place than half
-/// a spacing and so many of its deviations. Chosen.
-pub(crate) const UNPREDICTED_DEVIATIONS: f64 = 2.0;
 /// Odds of the unknown object over a known one, below which contacts in gaps do not take its lead:
 /// it comes first still, but a space that asks for more is not answered. Chosen.
 pub(crate) const UNPREDICTED_ODDS: f64 = 2.0;
 /// Distance of nodes, in spacings. Chosen.
 pub(crate) const NODE_STEP: f64 = 2.0;
-/// Error of what is predicted between the places, per distance of nodes, above which that distance
-/// grows: a node's field along the surface is then half as wide as it errs across. Chosen.
-pub(crate) const NODE_ERROR: f64 = 0.6;
-/// Factor by which this distance grows until the nodes fit. Chosen.
-pub(crate) const NODES_GROWTH: f64 = 1.25;
-/// Least distance of two nodes, in steps. Chosen.
-pub(crate) const NODE_APART: f64 = 0.55;
-/// Standard deviation of a contact about its node along the surface, in steps: that of a uniform
-/// field of half a step to each side. Derived.
-pub(crate) const NODE_FIELD: f64 = 0.288_675;
 
 // Translations: the Gaussian sum.
 
@@ -481,6 +336,8 @@ pub(crate) const COVERAGE_CONTACTS_MIN: usize = 4;
 
 // Explanation.
 
+/// Deviations within which the poses of both variants of an object are one. Chosen.
+pub(crate) const SAME_POSE_SDS: f64 = 3.0;
 /// Standard deviations of a contact's position, beside the spacing of the model, within which a
 /// place counts as explored. Chosen.
 pub(crate) const EXPLORED_SDS: f64 = 2.0;

@@ -68,8 +68,9 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// assumed noise, version 36 did not know which sessions have ended, version 37 learned the noise
 /// of odometry from false sightings, too, and forgot landmarks that were refused in a row, version
 /// 38 did not know where robots saw landmarks lately, version 39 not what ties archived
-/// landmarks to others, version 40 predicted objects of few contacts from their neighbours alone.
-const VERSION: u16 = 41;
+/// landmarks to others, version 40 predicted objects of few contacts from their neighbours alone,
+/// version 41 took them for bodies or lists of places, but not for either.
+const VERSION: u16 = 42;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

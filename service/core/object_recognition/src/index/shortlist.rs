@@ -195,7 +195,7 @@ mod tests {
         for k in 0..2000 {
             model.learn(&Contact::at(point(k), sd_m(k)));
         }
-        let packed = IndexedModel::new(&model).packed;
+        let packed = IndexedModel::variants(&model).0.packed;
         let wide = &packed.wide.numbers;
         assert!(wide.len() >= wide_min, "{}", wide.len());
         let mut shortlist = Shortlist::default();

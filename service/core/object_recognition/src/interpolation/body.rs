@@ -1,5 +1,7 @@
 //! The body that explains where an object was felt.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Point3, SMatrix, Vector3};
 
 use super::body_fit::{BodyFit, Candidate};
@@ -7,11 +9,12 @@ use super::graph::{LinkGraph, median};
 use super::superellipsoid::{PARAMETERS, Superellipsoid};
 use super::tails;
 use super::taken::Taken;
-use crate::model::ModelPlace;
-use crate::tuning::{
-    BODY_FOLD_STEPS, BODY_FOLDS, BODY_MISSED_SDS, BODY_PROBABILITY_MIN, SIDE_NORMAL_COS,
-    SIDE_PROBABILITY_MIN, SIDE_SAMPLES, SIDE_SAMPLES_APART, UNEXPECTED_SHARE,
+use super::tuning::{
+    BODY_FOLD_STEPS, BODY_FOLDS, BODY_MISSED_SDS, BODY_PROBABILITY_MIN, CHOSEN_RATIO_SD, CORE_MAX,
+    REGULARITY_SD, SIDE_NORMAL_COS, SIDE_PROBABILITY_MIN, SIDE_SAMPLES, SIDE_SAMPLES_APART,
+    UNEXPECTED_SHARE,
 };
+use crate::model::ModelPlace;
 
 /// A superellipsoid through the places of a model, and how well it is known.
 #[derive(Clone, Debug)]
@@ -28,6 +31,9 @@ pub(crate) struct Body {
     /// Share of contacts that are not as it predicts: as many as places, and more where it is off
     /// by more than contacts are, since it is the form of the object then in parts only.
     pub(crate) unexpected: f64,
+    /// By how much the places are likelier if they were chosen than if they are random
+    /// ([`chosen_log`]); none where they are too dense to tell.
+    pub(crate) chosen_log: Option<f64>,
 }
 
 /// How well places are predicted by bodies of the others.
@@ -56,7 +62,11 @@ impl Body {
     /// The body of the largest likelihood, and the log-likelihood per place, each predicted by the
     /// body of others, as [`Field::learned`](super::field::Field::learned) has it of the places
     /// around. None of a curve and of what lies in a plane.
-    pub(super) fn fitted(places: &[ModelPlace], graph: &LinkGraph) -> Option<(f64, Self)> {
+    pub(super) fn fitted(
+        places: &[ModelPlace],
+        graph: &LinkGraph,
+        spacing_m: f64,
+    ) -> Option<(f64, Self)> {
         if graph.is_curve() {
             return None;
         }
@@ -85,7 +95,9 @@ impl Body {
         let others = { found.iter().zip(&masses).skip(1) }
             .map(|(own, mass)| (mass / all, own.form.clone()))
             .filter(|(probability, _)| *probability > BODY_PROBABILITY_MIN);
+        let off = regularity(&best.form, &positions, spacing_m);
         let body = Self {
+            chosen_log: off.map(|off| chosen_log(off, positions.len())),
             form: best.form.clone(),
             others: others.collect(),
             covariance: covariance * (errors.variance_m2 / best.variance_m2),
@@ -148,24 +160,43 @@ impl Body {
                 .point(&Vector3::new(across * cos, across * sin, z))
         })
     }
+}
 
-    /// By how many deviations places lie farther from their nearest ones than points that are drawn
-    /// at random from the surface.
-    ///
-    /// Of n points on an area A the nearest is √(A/n)/2 away on average, with a deviation of 0.26
-    /// √A/n of the mean over all (Clark and Evans 1954, Distance to nearest neighbor as a measure
-    /// of spatial relationships in populations).
-    pub(super) fn regularity(&self, places: &[ModelPlace]) -> f64 {
-        let count = places.len().max(1) as f64;
-        let nearest_m = places.iter().enumerate().map(|(own, place)| {
-            let others = { places.iter().enumerate() }.filter(|(other, _)| *other != own);
-            let apart_m = others.map(|(_, other)| (other.position_m - place.position_m).norm());
-            apart_m.fold(f64::INFINITY, f64::min)
-        });
-        let side_m = (self.form.area_log().log / 2.0).exp();
-        let off_m = nearest_m.sum::<f64>() / count - 0.5 * side_m / count.sqrt();
-        off_m * count / (0.261_36 * side_m)
+/// By how many deviations points of a body lie farther from their nearest ones than points that are
+/// drawn at random from it, of which those within `spacing_m` of one another are one. `None` where
+/// those are so many that the rest tells little.
+///
+/// Of n points on an area A the nearest is m = √(A/n)/2 away on average, with a deviation of 0.26
+/// √A/n of the mean over all (Clark and Evans 1954, Distance to nearest neighbor as a measure of
+/// spatial relationships in populations). The distance r has the density 2πr n/A exp(−πr² n/A), and
+/// beyond a spacing h the mean h + m exp(x) erfc(√x) with x = πh²n/A, of which the first terms are
+/// m (1 + x − 4/(3√π) x^1.5 + x²/2).
+fn regularity(form: &Superellipsoid, points: &[Point3<f64>], spacing_m: f64) -> Option<f64> {
+    let count = points.len().max(1) as f64;
+    let nearest_m = points.iter().enumerate().map(|(own, point)| {
+        let others = { points.iter().enumerate() }.filter(|(other, _)| *other != own);
+        let apart_m = others.map(|(_, other)| (other - point).norm());
+        apart_m.fold(f64::INFINITY, f64::min)
+    });
+    let side_m = (form.area_log().log / 2.0).exp();
+    let within = PI * spacing_m * spacing_m * count / (side_m * side_m);
+    if within > CORE_MAX {
+        return None;
     }
+    let beyond = 1.0 + within - 0.752_25 * within.powf(1.5) + 0.5 * within * within;
+    let off_m = nearest_m.sum::<f64>() / count - 0.5 * side_m / count.sqrt() * beyond;
+    Some(off_m * count / (REGULARITY_SD * side_m))
+}
+
+/// Log-likelihood ratio of places that were chosen, and lie so many deviations farther apart than
+/// random ones, to random ones.
+///
+/// By chance that is a standard normal number. Of chosen places the mean distance is a part or a
+/// multiple of that of random ones: it is as normal, with the variance of that ratio added.
+fn chosen_log(regularity: f64, places: usize) -> f64 {
+    let of_ratio = 0.5 * CHOSEN_RATIO_SD / REGULARITY_SD;
+    let variance = 1.0 + of_ratio * of_ratio * places as f64;
+    0.5 * (regularity * regularity * (1.0 - 1.0 / variance) - variance.ln())
 }
 
 /// Probability of so many events at most, of which so many are expected.

@@ -6,11 +6,11 @@ use nalgebra::{Matrix3, Point3, Rotation3, SMatrix, SVector, UnitQuaternion, Vec
 
 use super::superellipsoid::{PARAMETERS, Superellipsoid};
 use super::tails;
-use crate::numeric::{bounds, centroid};
-use crate::tuning::{
+use super::tuning::{
     BODY_FIRST_STEPS, BODY_KEPT, BODY_LAST_STEPS, BODY_SAMPLES, BODY_STEP_MAX, EXPONENT_LOG,
     EXPONENT_LOG_RANGE, EXPONENT_LOG_SD, SIDE_NOISES, SIZE_LOG_SD, TAPER_MAX, TAPER_SD,
 };
+use crate::numeric::{bounds, centroid};
 
 type Parameters = SVector<f64, PARAMETERS>;
 type Information = SMatrix<f64, PARAMETERS, PARAMETERS>;

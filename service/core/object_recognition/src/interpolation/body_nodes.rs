@@ -8,12 +8,12 @@ use super::fields::{Fields, near};
 use super::graph::LinkGraph;
 use super::sides;
 use super::taken::Taken;
+use super::tuning::{
+    BODY_APART, BODY_POINTS, EXPLORED_REACH, NODE_ERROR, NODE_FIELD, NODES_GROWTH, NODES_MAX,
+};
 use crate::indexed_place::{Across, IndexedPlace, Prediction};
 use crate::model::ModelPlace;
-use crate::tuning::{
-    BODY_APART, BODY_POINTS, EXPLORED_REACH, NODE_ERROR, NODE_FIELD, NODE_STEP, NODES_GROWTH,
-    NODES_MAX,
-};
+use crate::tuning::NODE_STEP;
 
 /// The nodes on a body within reach of the places of a model that have these links.
 pub(super) fn on_body(

@@ -5,12 +5,12 @@ use nalgebra::{Point3, Vector3};
 use super::graph::{LinkGraph, median};
 use super::kriging::{Kriging, Weights};
 use super::tails;
+use super::tuning::{
+    ERROR_NEIGHBOURS, FIELD_LENGTHS, FIELD_NOISES, FIELD_SAMPLES, KRIGING_CURVE, KRIGING_SURFACE,
+};
 use crate::indexed_place::Across;
 use crate::model::{LevelMemory, ModelPlace};
-use crate::tuning::{
-    ERROR_NEIGHBOURS, FIELD_LENGTHS, FIELD_NOISES, FIELD_SAMPLES, KRIGING_CURVE, KRIGING_SURFACE,
-    SHRINKAGE,
-};
+use crate::tuning::SHRINKAGE;
 
 /// What varies over a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,11 +4,9 @@ use super::body::Body;
 use super::field::{Field, FieldOf, LeftOut, LocalField, Site};
 use super::graph::LinkGraph;
 use super::sides::Sides;
+use super::spread::Spread;
+use super::tuning::{BETWEEN_MIN, BODY_NATS, KRIGING_SURFACE, NODES_MAX, PREDICTED_NATS};
 use crate::model::ModelPlace;
-use crate::tuning::{
-    BETWEEN_MIN, BODY_NATS, KRIGING_SURFACE, NODES_MAX, PREDICTED_AT_RANDOM_NATS, PREDICTED_NATS,
-    RANDOM_SDS,
-};
 
 /// The fields of a model.
 pub(crate) struct Fields {
@@ -24,18 +22,28 @@ pub(super) enum Surface {
     Body(Box<Body>),
 }
 
-impl Fields {
-    /// `None` where neighbours tell little of one another, so that between them may be anything,
-    /// and of models that have too few or so many places that nothing lies between.
-    /// Where places are dense, `is_dense`, nothing lies between either; what lies beyond follows.
+/// The fields of a model by what lies between its places, each as far as it has any.
+#[derive(Default)]
+pub(crate) struct FieldVariants {
+    /// As the places tell for certain. None where neighbours tell little of one another, so that
+    /// between them may be anything, or nothing; and of models that have too few or so many places
+    /// that nothing lies between.
+    pub(crate) places: Option<Fields>,
+    /// Of a body, where it is uncertain whether more than the places can be felt.
+    pub(crate) body: Option<Fields>,
+}
+
+impl FieldVariants {
+    /// Of places with these links and a spacing \[m\], on which contacts fall so. Where they are
+    /// dense, nothing lies between them; what lies beyond follows.
     pub(crate) fn learned(
         places: &[ModelPlace],
         graph: &LinkGraph,
-        is_dense: bool,
-    ) -> Option<Self> {
+        (spread, spacing_m): (Spread, f64),
+    ) -> Self {
         let is_finite = graph.longest_m.is_finite() && graph.longest_m > 0.0;
         if !(BETWEEN_MIN..NODES_MAX).contains(&places.len()) || !is_finite {
-            return None;
+            return Self::default();
         }
         let mut channels: Vec<u16> = { places.iter() }
             .flat_map(|place| place.levels.iter().map(|level| level.channel))
@@ -52,10 +60,32 @@ impl Fields {
             .iter()
             .map(|(_, field)| field.predicted_nats(&anywhere, places));
         let told_nats = told.fold(f64::INFINITY, f64::min);
-        let surface = Surface::learned(&anywhere, places, graph, (told_nats, is_dense))?;
-        Some(Self { surface, levels })
+        // Levels of which those around tell less than nothing are in no field.
+        if told_nats < 0.0 {
+            return Self::default();
+        }
+        let are_told = told_nats >= PREDICTED_NATS;
+        // Nothing lies between places on which contacts fall alone.
+        if !are_told && spread != Spread::Even {
+            return Self::default();
+        }
+        let body = Surface::body(places, graph, spacing_m);
+        if are_told {
+            let surface = Surface::learned(&anywhere, places, graph, body);
+            let places = surface.map(|surface| Fields { surface, levels });
+            return Self { places, body: None };
+        }
+        // Who touches chosen points may do so again: between these nothing is felt.
+        let surface = body.and_then(|body| Surface::learned(&anywhere, places, graph, Some(body)));
+        let body = surface.filter(|surface| matches!(surface, Surface::Body(_)));
+        Self {
+            places: None,
+            body: body.map(|surface| Fields { surface, levels }),
+        }
     }
+}
 
+impl Fields {
     /// The body through all places, if it tells where the surface lies.
     pub(crate) fn body(&self) -> Option<&Body> {
         match &self.surface {
@@ -94,29 +124,23 @@ impl Fields {
 }
 
 impl Surface {
-    /// The surface that tells the places best, each by the others. `told_nats` is how much these
-    /// tell of a place's levels. `None` where that is too little. No body is sought where they are
-    /// dense, and none is taken of which a part was not felt.
+    /// The body through places, if all of it was felt, and the log-likelihood of a place, each
+    /// predicted by the others. None is sought where they are dense.
+    fn body(places: &[ModelPlace], graph: &LinkGraph, spacing_m: f64) -> Option<(f64, Body)> {
+        if graph.is_dense(spacing_m) {
+            return None;
+        }
+        let body = Body::fitted(places, graph, spacing_m);
+        body.filter(|(_, body)| body.is_felt_all_over(places))
+    }
+
+    /// The surface that tells the places best, each by the others: this body, or what is around.
     fn learned(
         anywhere: &[LeftOut],
         places: &[ModelPlace],
         graph: &LinkGraph,
-        (told_nats, is_dense): (f64, bool),
+        body: Option<(f64, Body)>,
     ) -> Option<Self> {
-        let are_told = told_nats >= PREDICTED_NATS;
-        if told_nats < PREDICTED_AT_RANDOM_NATS {
-            return None;
-        }
-        let body = Some(())
-            .filter(|()| !is_dense)
-            .and_then(|()| Body::fitted(places, graph));
-        let body = body.filter(|(_, body)| body.is_felt_all_over(places));
-        // Who touches chosen points may do so again: between these nothing is felt.
-        let is_random = |body: &Body| body.regularity(places).abs() < RANDOM_SDS;
-        let body = body.filter(|(_, body)| are_told || is_random(body));
-        if !are_told && body.is_none() {
-            return None;
-        }
         let (log, place) = Field::learned(FieldOf::Place, anywhere, places, graph)?;
         // Edges are supposed where places follow better from those on their own side.
         let edged = Sides::new(places, graph).and_then(|sides| {
@@ -127,10 +151,10 @@ impl Surface {
         let (log, place, sides) = edged.unwrap_or((log, place, Sides::none()));
         let count = places.len() as f64;
         let body = body.filter(|(own, _)| count * (own - log) > BODY_NATS);
-        match body {
-            Some((_, body)) => Some(Self::Body(Box::new(body))),
-            None => are_told.then_some(Self::Local { place, sides }),
-        }
+        Some(match body {
+            Some((_, body)) => Self::Body(Box::new(body)),
+            None => Self::Local { place, sides },
+        })
     }
 }
 

@@ -4,10 +4,11 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::tuning::{
-    DENSE_LINK, END_LINKS, LINK_BALL, LINK_LENGTH_MAX, LINK_NEIGHBOURS, NODE_STEP, OPEN_CURVE_COS,
+use super::tuning::{
+    DENSE_LINK, END_LINKS, LINK_BALL, LINK_LENGTH_MAX, LINK_NEIGHBOURS, OPEN_CURVE_COS,
     OPEN_SURFACE_RAD, RIM_MIN,
 };
+use crate::tuning::NODE_STEP;
 
 /// Places that neighbour one another.
 ///

@@ -25,9 +25,10 @@ mod spread;
 mod superellipsoid;
 mod tails;
 mod taken;
+mod tuning;
 mod unpredicted;
 
-pub(crate) use fields::Fields;
+pub(crate) use fields::{FieldVariants, Fields};
 pub(crate) use graph::LinkGraph;
 pub(crate) use nodes::interpolated;
 pub(crate) use open::{OpenRegion, Part};

@@ -8,9 +8,10 @@ use super::fields::{Fields, Surface, near};
 use super::graph::LinkGraph;
 use super::sides::Sides;
 use super::taken::Taken;
+use super::tuning::{NODE_APART, NODE_ERROR, NODE_FIELD, NODES_GROWTH, NODES_MAX};
 use crate::indexed_place::{IndexedPlace, Prediction};
 use crate::model::ModelPlace;
-use crate::tuning::{NODE_APART, NODE_ERROR, NODE_FIELD, NODE_STEP, NODES_GROWTH, NODES_MAX};
+use crate::tuning::NODE_STEP;
 
 /// Most parts of the side of a triangle: a thousand points lie on it then.
 const PARTS_MAX: u32 = 46;

@@ -6,12 +6,13 @@ use nalgebra::Point3;
 
 use super::graph::LinkGraph;
 use super::spread::Spread;
+use super::tuning::{
+    BETWEEN_MIN, ENTRIES_MAX, ENTRY_REACH, EXPLORED_REACH, FLAT_SHARE, MISSING_PER_KNOWN,
+    PARTIAL_PRIOR, UNEXPECTED_SHARE, UNEXPLORED_MIN,
+};
 use crate::index::nearest_place::NearestPlace;
 use crate::numeric::centroid;
-use crate::tuning::{
-    BETWEEN_MIN, ENTRIES_MAX, ENTRY_REACH, EVEN_SHARE_MIN, EXPLORED_REACH, FIELD_PER_SPACING,
-    FLAT_SHARE, MISSING_PER_KNOWN, NODE_STEP, PARTIAL_PRIOR, UNEXPECTED_SHARE, UNEXPLORED_MIN,
-};
+use crate::tuning::{EVEN_SHARE_MIN, FIELD_PER_SPACING, NODE_STEP};
 
 /// The part of space of which a model knows little: beyond the edge of what was felt, and in the
 /// gaps between what was felt.

@@ -4,11 +4,11 @@ use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 use super::field::{LeftOut, Site};
 use super::graph::LinkGraph;
-use crate::model::ModelPlace;
-use crate::tuning::{
+use super::tuning::{
     SIDE_COS, SIDE_FITS, SIDE_FITTED, SIDE_NOISES, SIDE_OFFSET, SIDE_PAIRS, SIDE_REACH,
     SIDE_THROUGH,
 };
+use crate::model::ModelPlace;
 
 /// A point of a plane, and its normal.
 type Plane = (Vector3<f64>, Unit<Vector3<f64>>);

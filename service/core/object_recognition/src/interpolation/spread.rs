@@ -3,8 +3,9 @@
 use nalgebra::{Point3, Vector3};
 
 use super::graph::LinkGraph;
+use super::tuning::UNEXPLORED_MIN;
 use crate::model::ModelPlace;
-use crate::tuning::{EVEN_SHARE_MIN, UNEXPLORED_MIN};
+use crate::tuning::EVEN_SHARE_MIN;
 
 /// Parts of the side of a triangle whose area is sampled by the middles of its parts.
 const PARTS: u32 = 4;

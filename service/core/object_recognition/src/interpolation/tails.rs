@@ -1,6 +1,6 @@
 //! Errors of which a few are far larger than the rest.
 
-use crate::tuning::TAILS;
+use super::tuning::TAILS;
 
 /// Weight of an error in a fit, by its square per variance: that of Student's distribution.
 pub(super) fn weight(square: f64) -> f64 {

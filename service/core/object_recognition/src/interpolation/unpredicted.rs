@@ -3,8 +3,9 @@
 use nalgebra::Point3;
 
 use super::graph::LinkGraph;
+use super::tuning::{BETWEEN_MIN, EXPLORED_REACH, UNPREDICTED_DEVIATIONS};
 use crate::index::nearest_place::NearestPlace;
-use crate::tuning::{BETWEEN_MIN, EXPLORED_REACH, NODE_STEP, UNPREDICTED_DEVIATIONS};
+use crate::tuning::NODE_STEP;
 
 /// The gaps between the places of a model that predicts nothing there.
 #[derive(Clone, Debug)]

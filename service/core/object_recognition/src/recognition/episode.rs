@@ -1,5 +1,7 @@
 //! An episode of recognition: contacts come in, a posterior comes out.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Point3;
 
 use crate::contact::{Contact, Reached};
@@ -14,6 +16,7 @@ use crate::recognition::likelihoods::{step_share_logs, unknown_fit_log, walk_log
 use crate::surfels::map::SurfelMap;
 use crate::translations::GaussianSum;
 use crate::tuning::{CONTACTS_MAX, LISTED_SHARE_MIN, REACH_PER_STEP, RIVALS_MAX, UNKNOWN_PRIOR};
+use crate::variant::VariantId;
 
 /// The state of one episode of recognition.
 ///
@@ -36,6 +39,8 @@ pub struct Recognition {
     pub(super) yaw_sd_rad: f64,
     /// Position of the first contact \[m\].
     pub(super) first_m: Option<Point3<f64>>,
+    /// Logs of the prior probabilities of the variants of each object, as they were then.
+    pub(super) variant_priors: BTreeMap<VariantId, f64>,
 }
 
 #[derive(Clone, Debug)]
@@ -61,12 +66,16 @@ impl Recognition {
             hypotheses,
             yaw_sd_rad: orientation.yaw_sd_rad(),
             first_m: None,
+            variant_priors: BTreeMap::new(),
         }
     }
 
     /// Updates the hypotheses with one contact.
     pub fn touch(&mut self, library: &ObjectLibrary, contact: Contact) {
         let contact = self.as_turned(contact);
+        if self.count == 0 {
+            self.variant_priors = library.variant_priors();
+        }
         match (self.contacts.last(), contact.reached) {
             (_, Reached::Aimed) => self.aimed += 1,
             (None, _) => {}
@@ -84,7 +93,7 @@ impl Recognition {
         let unknown_log = match &mut self.hypotheses {
             Hypotheses::Translations(translations) => {
                 let share_log = step_share_logs(library, reach_m);
-                let share = |object| library.indexed(object).map_or(0.0, &share_log);
+                let share = |of| library.variant(of).map_or(0.0, &share_log);
                 let log =
                     translations.touch(library, &self.contacts, &contact, sizes, &share, reach_m);
                 translations.settle();
@@ -232,7 +241,7 @@ impl Recognition {
             let masses = self.masses(library, object, RIVALS_MAX);
             let own = self.mass_log(library, object);
             rivals.extend(masses.iter().map(|mass| WeightedPose {
-                object,
+                of: mass.of,
                 map_from_episode: mass.map_from_episode,
                 weight: (mass.log - own + sum - all).exp(),
             }));

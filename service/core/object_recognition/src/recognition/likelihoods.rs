@@ -20,7 +20,7 @@ pub(super) fn step_share_logs(
     reach_m: Option<f64>,
 ) -> impl Fn(&IndexedModel) -> f64 {
     let log = move |indexed: &IndexedModel| -walk_log(indexed, 1, reach_m);
-    let logs = library.indexed_models().map(|(_, indexed)| log(indexed));
+    let logs = library.likelier_models().map(|(_, indexed)| log(indexed));
     let mean = logs.sum::<f64>() / library.len().max(1) as f64;
     move |indexed| log(indexed) - mean
 }

@@ -14,10 +14,13 @@ use crate::recognition::episode::Hypotheses;
 use crate::recognition::episode::Recognition;
 use crate::recognition::likelihoods::walk_log;
 use crate::translations::TranslationHypothesis;
-use crate::tuning::{LISTED_SHARE_MIN, LIVE_MASS, OTHER_POSES_MAX};
+use crate::tuning::{LISTED_SHARE_MIN, LIVE_MASS, OTHER_POSES_MAX, SAME_POSE_SDS};
+use crate::variant::{Variant, VariantId};
 
 /// One hypothesis of either kind.
 pub(super) struct PoseMass {
+    /// Its model.
+    pub(super) of: VariantId,
     pub(super) map_from_episode: Isometry3<f64>,
     covariance: Matrix6<f64>,
     /// Log of its mass.
@@ -29,26 +32,23 @@ impl Recognition {
     pub(crate) fn object_logs(&self, library: &ObjectLibrary) -> Vec<(ObjectId, f64)> {
         match &self.hypotheses {
             Hypotheses::Translations(translations) => {
-                let logs = translations.object_logs();
-                let log = |(object, _)| {
-                    let own = logs.get(&object).copied();
-                    (object, own.unwrap_or(f64::NEG_INFINITY))
-                };
-                library.indexed_models().map(log).collect()
+                let logs = translations.variant_logs();
+                let log = |(object, _)| (object, object_log(&logs, object));
+                library.iter().map(log).collect()
             }
             Hypotheses::Poses(_) => sums(library, &self.pose_logs(library)),
         }
     }
 
-    /// Logs of the factors that the masses of each object's translations have for its size.
-    pub(super) fn translation_sizes(&self, library: &ObjectLibrary) -> BTreeMap<ObjectId, f64> {
+    /// Logs of the factors that the masses of each model's translations have for its size, with its
+    /// prior given its object.
+    pub(super) fn translation_sizes(&self, library: &ObjectLibrary) -> BTreeMap<VariantId, f64> {
         let reach_m = self.reach_m();
-        let sizes = library.indexed_models().map(|(object, indexed)| {
+        let sizes = self.variant_priors.iter().filter_map(|(id, prior_log)| {
+            let indexed = library.variant(*id)?;
             let aimed = self.aimed as f64 * indexed.area_m2.ln();
-            (
-                object,
-                aimed + walk_log(indexed, self.steps_m.len(), reach_m),
-            )
+            let walked = walk_log(indexed, self.steps_m.len(), reach_m);
+            Some((*id, prior_log + aimed + walked))
         });
         sizes.collect()
     }
@@ -68,7 +68,7 @@ impl Recognition {
     /// How many hypotheses hold `LIVE_MASS` of the mass of all.
     pub(super) fn live_hypotheses(&self, library: &ObjectLibrary) -> usize {
         if let Hypotheses::Translations(translations) = &self.hypotheses {
-            return translations.holding(LIVE_MASS, |object| library.indexed(object).is_some());
+            return translations.holding(LIVE_MASS, |of| library.variant(of).is_some());
         }
         let mut logs = self.pose_logs(library);
         logs.sort_unstable_by(|a, b| b.1.total_cmp(&a.1));
@@ -113,14 +113,17 @@ impl Recognition {
                     let mut corner = covariance.fixed_view_mut::<3, 3>(0, 0);
                     corner.fill_diagonal(hypothesis.variance_m2);
                     PoseMass {
+                        of: hypothesis.of(),
                         map_from_episode: hypothesis.pose(&translations.rotations),
                         covariance,
                         log: hypothesis.evidence,
                     }
                 };
-                { translations.heaviest(object, most).into_iter() }
-                    .map(mass)
-                    .collect()
+                let variants = VariantId::both(object).into_iter();
+                let heaviest = variants.flat_map(|id| translations.heaviest(id, most));
+                let mut all = one_of_each_pose(heaviest.collect());
+                all.truncate(most);
+                all.into_iter().map(mass).collect()
             }
             Hypotheses::Poses(poses) => {
                 let own = poses.all.iter().filter(|pose| pose.object == object);
@@ -130,6 +133,10 @@ impl Recognition {
                     let middle = Translation3::from(surfel_map.middle);
                     let lever = se3::adjoint(&middle.into());
                     Some(PoseMass {
+                        of: VariantId {
+                            object,
+                            variant: Variant::Places,
+                        },
                         map_from_episode: middle * hypothesis.pose * origin,
                         covariance: lever
                             * hypothesis.information.try_inverse()?
@@ -149,8 +156,7 @@ impl Recognition {
     pub(super) fn mass_log(&self, library: &ObjectLibrary, object: ObjectId) -> f64 {
         match &self.hypotheses {
             Hypotheses::Translations(translations) => {
-                let log = translations.object_logs().get(&object).copied();
-                log.unwrap_or(f64::NEG_INFINITY)
+                object_log(&translations.variant_logs(), object)
             }
             Hypotheses::Poses(_) => {
                 let logs = self.pose_logs(library);
@@ -193,6 +199,30 @@ impl Recognition {
         let motion = Vector6::from_iterator(moved.iter().chain(turned.iter()).copied());
         motion * motion.transpose()
     }
+}
+
+/// These hypotheses of an object, heaviest first: those of both variants at one pose are one.
+fn one_of_each_pose(mut all: Vec<TranslationHypothesis>) -> Vec<TranslationHypothesis> {
+    all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    let mut poses: Vec<TranslationHypothesis> = Vec::with_capacity(all.len());
+    for own in all {
+        let same = |other: &&mut TranslationHypothesis| {
+            let square = (other.translation - own.translation).norm_squared();
+            let apart_m2 = SAME_POSE_SDS.powi(2) * (other.variance_m2 + own.variance_m2);
+            other.variant != own.variant && other.rotation == own.rotation && square < apart_m2
+        };
+        match poses.iter_mut().find(same) {
+            Some(other) => other.evidence = log_sum([other.evidence, own.evidence].into_iter()),
+            None => poses.push(own),
+        }
+    }
+    poses
+}
+
+/// Log of the mass of all variants of an object.
+fn object_log(logs: &BTreeMap<VariantId, f64>, object: ObjectId) -> f64 {
+    let variants = VariantId::both(object).into_iter();
+    log_sum(variants.filter_map(|id| logs.get(&id).copied()))
 }
 
 /// Log of each object's mass.

@@ -1,5 +1,6 @@
 //! The unknown object: how likely the contacts are of something that was never learned.
 
+use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_6, PI};
 
 use nalgebra::Isometry3;
@@ -16,6 +17,7 @@ use crate::tuning::{
     EARNED_MAX, ERROR_REACH, MISS_PER_CONTACT, OUTLIER_SHARE, UNKNOWN_ERROR_REACH, UNKNOWN_PRIOR,
     UNPREDICTED_ODDS,
 };
+use crate::variant::VariantId;
 
 impl Recognition {
     /// Probability that the right pose in a learned model is not among the hypotheses. The contacts
@@ -39,7 +41,7 @@ impl Recognition {
         let steps = self.steps_m.len() as f64;
         let shares = self.reach_m().map_or(0.0, |reach_m| {
             let logs = library
-                .indexed_models()
+                .likelier_models()
                 .map(|(_, s)| s.share(reach_m).max(1e-9).ln());
             logs.sum::<f64>() / library.len().max(1) as f64
         });
@@ -82,8 +84,10 @@ impl Recognition {
             return unknown.log();
         };
         let doubt = doubt(objects.len());
+        let logs = translations.variant_logs();
         let lead = |&(object, log): &(ObjectId, f64)| {
-            self.earned_lead(library, translations, object, unknown.plus(-log), doubt)
+            let leads = unknown.plus(-log);
+            self.earned_lead(library, translations, object, (&logs, leads, doubt))
         };
         let over_best = unknown.log() - best.1;
         let earned = lead(best).unwrap_or(over_best);
@@ -96,7 +100,7 @@ impl Recognition {
     }
 
     /// The lead of an unknown object over a known one, as it counts; none where that has no
-    /// hypothesis left. `leads` are those by all contacts.
+    /// hypothesis left. `leads` are those by all contacts, `logs` the masses of the variants.
     ///
     /// Contacts in one gap of a model share its errors. So the lead of an unknown object, or of the
     /// known one over what the library predicts, counts as that of fewer contacts. The lead of the
@@ -108,6 +112,9 @@ impl Recognition {
     /// an answer away, but calls nothing unknown: at a place that was missed a known object is
     /// named late rather than called unknown.
     ///
+    /// A known object with two variants counts as the heavier of them: where the other becomes
+    /// heavier, the lead may jump.
+    ///
     /// Where neighbouring places tell nothing of what lies between, contacts there call nothing
     /// unknown either: see [`Self::told_by_outliers`]. They leave the unknown object ahead, in
     /// doubt.
@@ -116,12 +123,12 @@ impl Recognition {
         library: &ObjectLibrary,
         translations: &GaussianSum,
         object: ObjectId,
-        leads: UnknownLogs,
-        doubt: f64,
+        (logs, leads, doubt): (&BTreeMap<VariantId, f64>, UnknownLogs, f64),
     ) -> Option<f64> {
-        let indexed = library.indexed(object)?;
+        let id = heavier(logs, object);
+        let indexed = library.variant(id)?;
         let lead = leads.log();
-        let heaviest = || translations.heaviest(object, 1).first().copied();
+        let heaviest = || translations.heaviest(id, 1).first().copied();
         if let Some(missed_share) = indexed.missed_share {
             let falls = heaviest().map(|own| own.falls).unwrap_or_default();
             let told = told_by_gaps(falls, missed_share);
@@ -164,6 +171,17 @@ impl Recognition {
         });
         // Of contacts that are no longer kept as many are supposed to have been in gaps.
         told.sum::<f64>() * self.count as f64 / self.contacts.len().max(1) as f64
+    }
+}
+
+/// The variant of an object that has the larger mass.
+fn heavier(logs: &BTreeMap<VariantId, f64>, object: ObjectId) -> VariantId {
+    let [places, body] = VariantId::both(object);
+    let log = |id| logs.get(&id).copied().unwrap_or(f64::NEG_INFINITY);
+    if log(body) > log(places) {
+        body
+    } else {
+        places
     }
 }
 

@@ -63,7 +63,7 @@ fn felt_at(points: impl Iterator<Item = (u64, Point3<f64>)>) -> ObjectModel {
 
 /// Where a model predicts its surface, and the deviation that it claims there \[m\].
 fn nodes(model: &ObjectModel) -> Vec<(Point3<f64>, f64)> {
-    let places = IndexedModel::new(model).places;
+    let places = IndexedModel::variants(model).0.places;
     let node = |place: &crate::indexed_place::IndexedPlace| {
         let prediction = place.prediction.as_ref()?;
         Some((place.position, prediction.error_m))
@@ -199,7 +199,7 @@ fn an_outline_is_no_body() {
             let point = Point3::new(radius_m * cos, radius_m * sin, 0.0);
             (1000 * object + u64::from(number), point)
         });
-        let indexed = IndexedModel::new(&felt_at(points));
+        let indexed = IndexedModel::variants(&felt_at(points)).0;
         assert!(indexed.is_vague() || !indexed.shares_errors(), "{object}");
     }
 }
@@ -211,7 +211,7 @@ fn nodes_of_a_body_have_normals_where_places_have() {
     for key in 0..40 {
         model.learn(&touch(on_ball(RADIUS_M, key), &Isometry3::identity(), key));
     }
-    let places = IndexedModel::new(&model).places;
+    let places = IndexedModel::variants(&model).0.places;
     let nodes = places.iter().filter(|place| place.prediction.is_some());
     assert!(nodes.clone().count() > 100);
     for node in nodes {
@@ -240,4 +240,76 @@ fn between_chosen_points_with_levels_of_their_own_nothing_is_predicted() {
         model.learn(&contact);
     }
     assert_eq!(nodes(&model), Vec::new());
+    let mut library = ObjectLibrary::default();
+    library.put(ObjectId(0), model);
+    assert_eq!(library.variants().count(), 1, "nor by a body");
+}
+
+/// A ball that was touched at these points, with levels that tell little of one another.
+fn ball_touched_at(points: impl Iterator<Item = (u64, Vector3<f64>)>) -> ObjectModel {
+    let mut model = ObjectModel::new(ModelSettings::default());
+    for (key, at) in points {
+        let level = at.z + 0.4 * normal(50_000 + key);
+        let at = Point3::from(RADIUS_M * at);
+        let felt = touch((at, Vector3::z_axis()), &Isometry3::identity(), key);
+        let contact = Contact::at(felt.position_m, NOISE_M);
+        model.learn(&contact.with_level(0, level, 0.03));
+    }
+    model
+}
+
+/// Who touched points that he chose may touch them again, and between them nothing is felt.
+#[test]
+fn a_body_is_supposed_of_random_points_and_not_of_chosen_ones() {
+    let random = |ball: u64| {
+        ball_touched_at((100 * ball..).take(24).map(|key| {
+            let at = on_ball(1.0, key).0;
+            (key, at.coords)
+        }))
+    };
+    let chosen = |ball: u64| {
+        ball_touched_at((100 * ball..).zip(0..24).map(|(key, number)| {
+            let z = (f64::from(number) + 0.5) / 12.0 - 1.0;
+            let (sin, cos) = (2.4 * f64::from(number)).sin_cos();
+            let across = (1.0 - z * z).sqrt();
+            (key, Vector3::new(across * cos, across * sin, z))
+        }))
+    };
+    // Those of which neighbouring levels tell less than nothing are lists anyway.
+    let variants = |models: &[ObjectModel]| {
+        let mut library = ObjectLibrary::default();
+        for (id, model) in (0..).zip(models) {
+            // Its levels leave open whether anything lies between its places.
+            let (places, body) = IndexedModel::variants(model);
+            assert!(!places.shares_errors() && body.is_some(), "{id}");
+            library.put(ObjectId(id), model.clone());
+        }
+        library.variants().count()
+    };
+    let random = [0, 1, 5, 6, 7].map(random);
+    assert_eq!(variants(&random), 2 * random.len());
+    let chosen = [0, 1, 3, 7].map(chosen);
+    assert_eq!(variants(&chosen), chosen.len());
+    // Of both kinds, of which four are beyond doubt: each has its own odds.
+    let [mixed @ .., _, _, _] = &random;
+    let mixed: Vec<ObjectModel> = mixed.iter().chain(&chosen[..2]).cloned().collect();
+    assert_eq!(variants(&mixed), 2 * 2 + 2);
+}
+
+/// Contacts beside one another are one place, so that random places are never near one another.
+#[test]
+fn random_contacts_are_not_taken_for_chosen_ones_however_many_they_are() {
+    for contacts in [24, 60, 120, 240] {
+        let logs = (0..8_u64).filter_map(|ball| {
+            let keys = 10_000 + 1_000 * ball..;
+            let points = keys
+                .take(contacts)
+                .map(|key| (key, on_ball(1.0, key).0.coords));
+            let (places, body) = IndexedModel::variants(&ball_touched_at(points));
+            body.unwrap_or(places).chosen_log
+        });
+        let mut logs: Vec<f64> = logs.collect();
+        logs.sort_by(f64::total_cmp);
+        assert!(logs.len() == 8 && logs[5] < 0.0, "{contacts}: {logs:?}");
+    }
 }

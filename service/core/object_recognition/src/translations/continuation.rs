@@ -29,7 +29,7 @@ pub(super) fn continued_log(
     let count = library.len().max(1) as f64;
     let (mut shares, mut extents_m, mut spacings_m, mut curves) = (0.0, 0.0, 0.0, 0.0);
     let mut shared = false;
-    for (_, indexed) in library.indexed_models() {
+    for (_, indexed) in library.likelier_models() {
         shares += indexed.share(reach_m).max(1e-9).ln();
         extents_m += indexed.extent_m;
         spacings_m += indexed.spacing_m;

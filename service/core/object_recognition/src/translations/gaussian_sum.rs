@@ -6,7 +6,7 @@ use nalgebra::UnitQuaternion;
 
 use crate::contact::{Contact, Reached};
 use crate::indexed_model::IndexedModel;
-use crate::library::{ObjectId, ObjectLibrary};
+use crate::library::ObjectLibrary;
 use crate::numeric::{log_sum, to_f32};
 use crate::percept_likelihood::ContactPercepts;
 use crate::translations::background::{BackgroundModel, UnknownContact};
@@ -22,12 +22,13 @@ use crate::tuning::{
     NEGLIGIBLE_SHARE, PREFILTER_CONTACTS_MAX, PROMOTION_MAX, PROMOTION_MIN, PROMOTION_SEEDS,
     PRUNE_NATS, SHARED_PRUNE_NATS, TRANSLATIONS_MAX, WAITING_CONTACTS, WAITING_SHARE,
 };
+use crate::variant::VariantId;
 
 /// All hypotheses.
 #[derive(Clone, Debug)]
 pub(crate) struct GaussianSum {
     pub(crate) rotations: Vec<UnitQuaternion<f64>>,
-    /// The exact hypotheses, by object, rotation and place.
+    /// The exact hypotheses, by model, rotation and place.
     all: Vec<TranslationHypothesis>,
     /// The seeds that were not promoted.
     prefilter: Prefilter,
@@ -35,8 +36,8 @@ pub(crate) struct GaussianSum {
     unexplored: Unexplored,
     /// Log-likelihoods of the contacts under an unknown object, without those that were asked for.
     pub(crate) background: BackgroundModel,
-    /// Logs of the factors that all masses of each object have for its size.
-    sizes: BTreeMap<ObjectId, f64>,
+    /// Logs of the factors that all masses of each model have for its size.
+    sizes: BTreeMap<VariantId, f64>,
 }
 
 impl GaussianSum {
@@ -59,7 +60,7 @@ impl GaussianSum {
 
     /// Updates all hypotheses with a contact, and returns what it adds to the log-likelihood of the
     /// unknown object, if that predicts it; `before` are the earlier ones that are kept. `sizes`
-    /// are the logs of the factors that the masses of each object have for its size, after the
+    /// are the logs of the factors that the masses of each model have for its size, after the
     /// contact, `share` is that of one step of a walk, per that of a typical object, and `reach_m`
     /// is the radius within which a walk's next contact lies.
     ///
@@ -70,8 +71,8 @@ impl GaussianSum {
         library: &ObjectLibrary,
         before: &[Contact],
         contact: &Contact,
-        sizes: BTreeMap<ObjectId, f64>,
-        share: &impl Fn(ObjectId) -> f64,
+        sizes: BTreeMap<VariantId, f64>,
+        share: &impl Fn(VariantId) -> f64,
         reach_m: Option<f64>,
     ) -> Option<f64> {
         let Some(last) = before.last() else {
@@ -93,7 +94,8 @@ impl GaussianSum {
         if !self.prefilter.is_empty() {
             self.promote(library, before, &touch, &mut buffers, &mut parts);
         }
-        let bare = |object| Some(unknown.as_ref()?.of_objects.get(&object)?.bare + share(object));
+        let bare =
+            |of: VariantId| Some(unknown.as_ref()?.of_objects.get(&of.object)?.bare + share(of));
         let best = parts.iter().map(|part| part.evidence);
         let best = best.fold(self.prefilter.best_log(), f64::max);
         let (rotations, least) = (&self.rotations, best - PRUNE_NATS);
@@ -104,14 +106,14 @@ impl GaussianSum {
         Some(unknown?.log)
     }
 
-    /// Changes the factors that the masses of each object have for its size.
-    fn resize(&mut self, sizes: BTreeMap<ObjectId, f64>) {
-        let of = |object: ObjectId| {
-            let before = self.sizes.get(&object).copied().unwrap_or_default();
-            sizes.get(&object).map_or(0.0, |now| now - before)
+    /// Changes the factors that the masses of each model have for its size.
+    fn resize(&mut self, sizes: BTreeMap<VariantId, f64>) {
+        let of = |model: VariantId| {
+            let before = self.sizes.get(&model).copied().unwrap_or_default();
+            sizes.get(&model).map_or(0.0, |now| now - before)
         };
-        for own in self.all.chunk_by_mut(|a, b| a.object == b.object) {
-            let log = of(own[0].object);
+        for own in self.all.chunk_by_mut(|a, b| a.of() == b.of()) {
+            let log = of(own[0].of());
             for hypothesis in own {
                 hypothesis.evidence += log;
             }
@@ -123,8 +125,11 @@ impl GaussianSum {
 
     /// After a touch: what an unknown object would be taken for.
     pub(crate) fn settle(&mut self) {
-        let logs = self.object_logs().into_iter();
-        let best = logs.max_by(|a, b| a.1.total_cmp(&b.1));
+        let logs = self.variant_logs();
+        let logs: Vec<(VariantId, f64)> = logs.into_iter().collect();
+        let objects = logs.chunk_by(|a, b| a.0.object == b.0.object);
+        let objects = objects.map(|own| (own[0].0.object, log_sum(own.iter().map(|own| own.1))));
+        let best = objects.max_by(|a, b| a.1.total_cmp(&b.1));
         self.background.settle(best.map(|(object, _)| object));
     }
 
@@ -170,10 +175,10 @@ impl GaussianSum {
         let touches: Vec<&TouchUpdate<'_>> = touches.iter().chain([touch]).collect();
         let mut replay = |prefilter: &mut Prefilter, seed: &Seed, parts: &mut Vec<_>| {
             let (mut hypothesis, known) = prefilter.take(seed, &self.rotations, &first);
-            let size = self.sizes.get(&hypothesis.object);
+            let size = self.sizes.get(&hypothesis.of());
             hypothesis.evidence += size.copied().unwrap_or_default();
             let rotation = &self.rotations[usize::from(hypothesis.rotation)];
-            buffers.replay(rotation, &known.indexed, hypothesis, &touches, parts);
+            buffers.replay(rotation, known, hypothesis, &touches, parts);
         };
         for seed in &promoted {
             replay(&mut prefilter, seed, parts);
@@ -186,14 +191,14 @@ impl GaussianSum {
         } else {
             best - PRUNE_NATS
         };
-        // The last hypothesis of an object stays.
-        let mut held: Vec<ObjectId> = parts.iter().map(|part| part.object).collect();
+        // The last hypothesis of a model stays.
+        let mut held: Vec<VariantId> = parts.iter().map(TranslationHypothesis::of).collect();
         held.sort_unstable();
-        for object in prefilter.exhausted(least) {
-            if held.binary_search(&object).is_ok() {
+        for model in prefilter.exhausted(least) {
+            if held.binary_search(&model).is_ok() {
                 continue;
             }
-            for seed in prefilter.best_of(object, 1) {
+            for seed in prefilter.best_of(model, 1) {
                 replay(&mut prefilter, &seed, parts);
             }
         }
@@ -201,17 +206,17 @@ impl GaussianSum {
         self.prefilter = prefilter;
     }
 
-    /// Drops hypotheses without evidence, and the lightest beyond the budget; each object keeps its
+    /// Drops hypotheses without evidence, and the lightest beyond the budget; each model keeps its
     /// best.
     fn prune(&mut self, library: &ObjectLibrary) {
         let most = TRANSLATIONS_MAX;
         let evidences = self.all.iter().map(|hypothesis| hypothesis.evidence);
         let best = evidences.fold(self.prefilter.best_log(), f64::max);
-        let by_object = || self.all.chunk_by(|a, b| a.object == b.object);
+        let by_model = || self.all.chunk_by(|a, b| a.of() == b.of());
         let mut evidences = Vec::with_capacity(self.all.len());
         let mut floors = Vec::new();
-        for own in by_object() {
-            let indexed = library.indexed(own[0].object);
+        for own in by_model() {
+            let indexed = library.variant(own[0].of());
             let nats = if indexed.is_some_and(IndexedModel::is_vague) {
                 SHARED_PRUNE_NATS
             } else {
@@ -232,7 +237,7 @@ impl GaussianSum {
             room = most - heavier.iter().filter(|evidence| **evidence > least).count();
         }
         let mut kept = Vec::with_capacity(self.all.len().min(most));
-        for (own, floor) in by_object().zip(floors) {
+        for (own, floor) in by_model().zip(floors) {
             let before = kept.len();
             for hypothesis in own.iter().filter(|own| own.evidence > floor) {
                 let is_lightest = hypothesis.evidence <= least;
@@ -248,41 +253,38 @@ impl GaussianSum {
         self.all = kept;
     }
 
-    /// Log of the mass of each object that has any.
-    pub(crate) fn object_logs(&self) -> BTreeMap<ObjectId, f64> {
-        let own = self.all.chunk_by(|a, b| a.object == b.object).map(|own| {
+    /// Log of the mass of each model that has any.
+    pub(crate) fn variant_logs(&self) -> BTreeMap<VariantId, f64> {
+        let own = self.all.chunk_by(|a, b| a.of() == b.of()).map(|own| {
             let logs = own.iter().map(|hypothesis| hypothesis.evidence);
-            (own[0].object, log_sum(logs))
+            (own[0].of(), log_sum(logs))
         });
-        let mut sums: BTreeMap<ObjectId, f64> = BTreeMap::new();
-        for (object, log) in own.chain(self.prefilter.masses()) {
-            let sum = sums.entry(object).or_insert(f64::NEG_INFINITY);
+        let mut sums: BTreeMap<VariantId, f64> = BTreeMap::new();
+        for (of, log) in own.chain(self.prefilter.masses()) {
+            let sum = sums.entry(of).or_insert(f64::NEG_INFINITY);
             *sum = log_sum([*sum, log].into_iter());
         }
         self.unexplored.add_to(&mut sums);
         sums
     }
 
-    /// Number of hypotheses that hold a share of all mass of the objects that count.
-    pub(crate) fn holding(&self, share: f64, counts: impl Fn(ObjectId) -> bool) -> usize {
-        let logs = self.object_logs();
-        let logs = logs.iter().filter(|(object, _)| counts(**object));
+    /// Number of hypotheses that hold a share of all mass of the models that count.
+    pub(crate) fn holding(&self, share: f64, counts: impl Fn(VariantId) -> bool) -> usize {
+        let logs = self.variant_logs();
+        let logs = logs.iter().filter(|(of, _)| counts(**of));
         let all = log_sum(logs.map(|(_, log)| *log));
         let mut histogram = MassHistogram::new(self.prefilter.len());
-        for hypothesis in self.all.iter().filter(|own| counts(own.object)) {
+        for hypothesis in self.all.iter().filter(|own| counts(own.of())) {
             histogram.add(to_f32((hypothesis.evidence - all).exp()));
         }
         self.prefilter.count(&mut histogram, -all, counts);
         histogram.holding(share * histogram.sum())
     }
 
-    /// The `most` heaviest hypotheses of an object, heaviest first.
-    pub(crate) fn heaviest(&self, object: ObjectId, most: usize) -> Vec<TranslationHypothesis> {
-        let own = self
-            .all
-            .iter()
-            .filter(|hypothesis| hypothesis.object == object);
-        let prefilter = self.prefilter.best_of(object, most);
+    /// The `most` heaviest hypotheses of a model, heaviest first.
+    pub(crate) fn heaviest(&self, of: VariantId, most: usize) -> Vec<TranslationHypothesis> {
+        let own = self.all.iter().filter(|hypothesis| hypothesis.of() == of);
+        let prefilter = self.prefilter.best_of(of, most);
         let prefilter = prefilter
             .iter()
             .filter_map(|seed| self.prefilter.hypothesis(seed, &self.rotations));

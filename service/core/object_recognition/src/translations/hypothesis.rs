@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::library::ObjectId;
 use crate::tuning::MERGE_CELL_SD;
+use crate::variant::{Variant, VariantId};
 
 /// Bits of a cell's number along an axis; cells that differ by more are far beyond any map.
 const AXIS_BITS: u32 = 24;
@@ -14,6 +15,7 @@ pub(crate) const CELL_BITS: u32 = 3 * AXIS_BITS;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TranslationHypothesis {
     pub(crate) object: ObjectId,
+    pub(crate) variant: Variant,
     pub(crate) rotation: u16,
     /// The episode's origin in the model's frame \[m\].
     pub(crate) translation: Vector3<f64>,
@@ -38,6 +40,19 @@ pub(crate) struct Falls {
 }
 
 impl TranslationHypothesis {
+    /// The model and its rotation.
+    pub(crate) fn map(&self) -> (VariantId, u16) {
+        (self.of(), self.rotation)
+    }
+
+    /// The model.
+    pub(crate) fn of(&self) -> VariantId {
+        VariantId {
+            object: self.object,
+            variant: self.variant,
+        }
+    }
+
     /// Its mean pose.
     pub(crate) fn pose(&self, rotations: &[UnitQuaternion<f64>]) -> Isometry3<f64> {
         Isometry3::from_parts(
@@ -46,7 +61,7 @@ impl TranslationHypothesis {
         )
     }
 
-    /// Cell of the translation: hypotheses of one object, rotation and cell are merged.
+    /// Cell of the translation: hypotheses of one map and cell are merged.
     pub(crate) fn cell(&self) -> u128 {
         // The width of a cell is rounded down to a power of two, the exponent's bits alone, so that
         // hypotheses of about the same variance have the same cells.

@@ -1,22 +1,21 @@
 //! Merging: hypotheses of one cell become one, with the moments of all.
 
-use crate::library::ObjectId;
 use crate::numeric::to_f32;
 use crate::translations::hypothesis::{CELL_BITS, Falls, TranslationHypothesis};
+use crate::variant::VariantId;
 
-/// Merges hypotheses of one object, rotation and cell, and sorts by these.
+/// Merges hypotheses of one model, rotation and cell, and sorts by these.
 pub(crate) fn merged(all: &[TranslationHypothesis]) -> Vec<TranslationHypothesis> {
-    let maps = |own: &TranslationHypothesis| (own.object, own.rotation);
-    let mut ranks: Vec<(ObjectId, u16)> = { all.chunk_by(|a, b| maps(a) == maps(b)) }
-        .map(|own| maps(&own[0]))
+    let mut ranks: Vec<(VariantId, u16)> = { all.chunk_by(|a, b| a.map() == b.map()) }
+        .map(|own| own[0].map())
         .collect();
     ranks.sort_unstable();
     ranks.dedup();
     // Rank of the map, cell and number side by side: one comparison orders by all three.
     let mut keyed = Vec::with_capacity(all.len());
     let mut numbers = 0u32..;
-    for own in all.chunk_by(|a, b| maps(a) == maps(b)) {
-        let rank = ranks.partition_point(|other| *other < maps(&own[0]));
+    for own in all.chunk_by(|a, b| a.map() == b.map()) {
+        let rank = ranks.partition_point(|other| *other < own[0].map());
         let high = (rank as u128) << (CELL_BITS + u32::BITS);
         let keys = { own.iter().zip(&mut numbers) }
             .map(|(hypothesis, number)| high | hypothesis.cell() << u32::BITS | u128::from(number));
@@ -82,10 +81,13 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+    use crate::library::ObjectId;
+    use crate::variant::Variant;
 
     fn hypothesis(object: u32, x: f64, evidence: f64) -> TranslationHypothesis {
         TranslationHypothesis {
             object: ObjectId(object),
+            variant: Variant::Places,
             rotation: 0,
             translation: Vector3::new(x, -1.0, 0.0),
             variance_m2: 1e-6,

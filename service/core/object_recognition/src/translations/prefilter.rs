@@ -5,7 +5,8 @@ use std::sync::Arc;
 use nalgebra::UnitQuaternion;
 
 use crate::contact::Contact;
-use crate::library::{LibraryEntry, ObjectId, ObjectLibrary};
+use crate::indexed_model::IndexedModel;
+use crate::library::ObjectLibrary;
 use crate::numeric::to_f32;
 use crate::percept_likelihood::ContactPercepts;
 use crate::translations::hypothesis::TranslationHypothesis;
@@ -13,6 +14,7 @@ use crate::translations::mass_histogram::MassHistogram;
 use crate::translations::prefilter_group::{PrefilterGroup, Scratch};
 use crate::translations::touch_update::TouchUpdate;
 use crate::tuning::{RESCALE, RESIZE_NATS_MAX, SEEDS_MAX};
+use crate::variant::VariantId;
 
 /// The *seeds*: all first places that hold a mass and were not promoted to hypotheses of their own.
 ///
@@ -20,7 +22,7 @@ use crate::tuning::{RESCALE, RESIZE_NATS_MAX, SEEDS_MAX};
 /// touched, or none. Without a place near, that is exact.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Prefilter {
-    /// By object and rotation.
+    /// By model and rotation.
     groups: Vec<PrefilterGroup>,
     first: Option<Contact>,
     /// Log of the common factor of all weights.
@@ -42,7 +44,7 @@ impl Prefilter {
         rotations: &[UnitQuaternion<f64>],
         contact: &Contact,
     ) -> Self {
-        let places = library.indexed_models().map(|(_, own)| own.places.len());
+        let places = library.variants().map(|(_, own)| own.places.len());
         let stride = (places.sum::<usize>() * rotations.len()).div_ceil(SEEDS_MAX);
         let stride = stride.max(1);
         let mut prefilter = Self {
@@ -52,22 +54,17 @@ impl Prefilter {
         };
         let percepts = ContactPercepts::new(contact, library.level_prior());
         let mut likelihoods = Vec::new();
-        for (object, known) in library.all() {
-            let places = known.indexed.places.len() * rotations.len();
-            let unexplored = known
-                .indexed
-                .open
-                .as_ref()
-                .map_or(0.0, |open| open.unexplored);
+        for (of, known) in library.variants() {
+            let places = known.places.len() * rotations.len();
+            let unexplored = known.open.as_ref().map_or(0.0, |open| open.unexplored);
             let each = (1.0 - unexplored) * stride as f64 / places.max(1) as f64;
             for (rotation, turn) in (0u16..).zip(rotations) {
-                let local = percepts.at(&known.indexed, turn);
+                let local = percepts.at(known, turn);
                 if rotation == 0 || !local.is_rotation_invariant() {
                     local.likelihoods(&mut likelihoods);
                 }
                 let known = Arc::clone(known);
-                let group =
-                    PrefilterGroup::new((object, rotation), known, each, stride, &likelihoods);
+                let group = PrefilterGroup::new((of, rotation), known, each, stride, &likelihoods);
                 prefilter.groups.push(group);
             }
         }
@@ -96,31 +93,29 @@ impl Prefilter {
         f64::from(self.most()).ln() + self.log
     }
 
-    /// Log of the mass of each group, with its object.
-    pub(crate) fn masses(&self) -> impl Iterator<Item = (ObjectId, f64)> {
+    /// Log of the mass of each group, with its model.
+    pub(crate) fn masses(&self) -> impl Iterator<Item = (VariantId, f64)> {
         self.groups
             .iter()
-            .map(|group| (group.object, group.sum.ln() + self.log))
+            .map(|group| (group.of, group.sum.ln() + self.log))
     }
 
-    /// Counts the masses of the objects that count, multiplied by e^`log`.
+    /// Counts the masses of the models that count, multiplied by e^`log`.
     pub(crate) fn count(
         &self,
         histogram: &mut MassHistogram,
         log: f64,
-        counts: impl Fn(ObjectId) -> bool,
+        counts: impl Fn(VariantId) -> bool,
     ) {
         let scale = to_f32((self.log + log).exp());
-        for group in self.groups.iter().filter(|group| counts(group.object)) {
+        for group in self.groups.iter().filter(|group| counts(group.of)) {
             histogram.add_all(&group.weights, scale);
         }
     }
 
-    /// Multiplies the masses of each object by e^`log`.
-    pub(crate) fn resize(&mut self, log: impl Fn(ObjectId) -> f64) {
-        let logs: Vec<f64> = { self.groups.iter() }
-            .map(|group| log(group.object))
-            .collect();
+    /// Multiplies the masses of each model by e^`log`.
+    pub(crate) fn resize(&mut self, log: impl Fn(VariantId) -> f64) {
+        let logs: Vec<f64> = { self.groups.iter() }.map(|group| log(group.of)).collect();
         // What all have in common is no matter of weights.
         let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         for (group, log) in self.groups.iter_mut().zip(logs) {
@@ -151,7 +146,7 @@ impl Prefilter {
         for group in &mut self.groups {
             let own = &mut supported[from..from + group.weights.len()];
             from += own.len();
-            if library.indexed(group.object).is_none() {
+            if library.variant(group.of).is_none() {
                 group.forget();
                 continue;
             }
@@ -214,7 +209,7 @@ impl Prefilter {
         seed: &Seed,
         rotations: &[UnitQuaternion<f64>],
         first: &ContactPercepts<'_>,
-    ) -> (TranslationHypothesis, &LibraryEntry) {
+    ) -> (TranslationHypothesis, &IndexedModel) {
         let group = &mut self.groups[seed.group];
         group.weights[seed.number] = 0.0;
         let rotation = &rotations[usize::from(group.rotation)];
@@ -224,11 +219,11 @@ impl Prefilter {
         )
     }
 
-    /// The `most` heaviest seeds of an object, heaviest first.
-    pub(crate) fn best_of(&self, object: ObjectId, most: usize) -> Vec<Seed> {
+    /// The `most` heaviest seeds of a model, heaviest first.
+    pub(crate) fn best_of(&self, of: VariantId, most: usize) -> Vec<Seed> {
         let mut best: Vec<Seed> = Vec::new();
-        let from = self.groups.partition_point(|group| group.object < object);
-        let to = self.groups.partition_point(|group| group.object <= object);
+        let from = self.groups.partition_point(|group| group.of < of);
+        let to = self.groups.partition_point(|group| group.of <= of);
         for (number, group) in (from..to).zip(&self.groups[from..to]) {
             for (seed, weight) in group.weights.iter().enumerate() {
                 let least = best.get(most - 1).map_or(0.0, |least| least.weight);
@@ -262,12 +257,12 @@ impl Prefilter {
         })
     }
 
-    /// Objects whose seeds all have a mass below e^`least_log`.
-    pub(crate) fn exhausted(&self, least_log: f64) -> Vec<ObjectId> {
+    /// Models whose seeds all have a mass below e^`least_log`.
+    pub(crate) fn exhausted(&self, least_log: f64) -> Vec<VariantId> {
         let least = to_f32((least_log - self.log).exp());
-        let own = self.groups.chunk_by(|a, b| a.object == b.object);
+        let own = self.groups.chunk_by(|a, b| a.of == b.of);
         let exhausted = own.filter(|own| own.iter().all(|group| group.most < least));
-        exhausted.map(|own| own[0].object).collect()
+        exhausted.map(|own| own[0].of).collect()
     }
 
     /// Drops seeds whose mass is below e^`least_log`.

@@ -8,20 +8,21 @@ use nalgebra::UnitQuaternion;
 use crate::contact::Contact;
 use crate::index::nearest_grid::NearestGrid;
 use crate::index::packed_places::PackedPlaces;
-use crate::library::{LibraryEntry, ObjectId};
+use crate::indexed_model::IndexedModel;
 use crate::numeric::{exp, to_f32};
 use crate::percept_likelihood::{ContactPercepts, PerceptLikelihood};
 use crate::translations::hypothesis::{Falls, TranslationHypothesis};
 use crate::translations::touch_update::{TouchUpdate, share};
 use crate::tuning::{GAIN_MAX, LIVE_SEEDS_RATIO};
+use crate::variant::VariantId;
 
 /// The places of a model in one rotation, each taken for the one touched first.
 #[derive(Clone, Debug)]
 pub(crate) struct PrefilterGroup {
-    pub(crate) object: ObjectId,
+    pub(crate) of: VariantId,
     pub(crate) rotation: u16,
     /// The model at the first touch.
-    known: Arc<LibraryEntry>,
+    known: Arc<IndexedModel>,
     /// Prior probability of each seed, given the model.
     each: f64,
     /// Mass of each seed, on the prefilter's scale; 0 for promoted and dropped ones.
@@ -52,7 +53,7 @@ pub(crate) struct Scratch {
     /// Likelihood ratio of the percepts at each place of the model, then 0 for no place.
     likelihoods: Vec<f32>,
     /// The model of these likelihoods, if they are the same in all rotations.
-    likelihoods_of: Option<ObjectId>,
+    likelihoods_of: Option<VariantId>,
     /// Squared distance \[m²\] and likelihood ratio of the nearest place.
     squares: Vec<f32>,
     found: Vec<f32>,
@@ -101,7 +102,7 @@ impl Scratch {
     }
 
     /// Evaluates the percepts at the nearest places.
-    fn evaluate(&mut self, packed: &PackedPlaces, object: ObjectId, local: &PerceptLikelihood<'_>) {
+    fn evaluate(&mut self, packed: &PackedPlaces, of: VariantId, local: &PerceptLikelihood<'_>) {
         let places = packed.all.len();
         self.found.resize(self.cells.len(), 0.0);
         let found = self.found.iter_mut().zip(&self.cells);
@@ -114,11 +115,11 @@ impl Scratch {
             }
             return;
         }
-        if self.likelihoods_of != Some(object) || !local.is_rotation_invariant() {
+        if self.likelihoods_of != Some(of) || !local.is_rotation_invariant() {
             local.likelihoods(&mut self.likelihoods);
             // The entry for no place makes the lookup branch-free.
             self.likelihoods.push(0.0);
-            self.likelihoods_of = Some(object);
+            self.likelihoods_of = Some(of);
         }
         let likelihoods = &self.likelihoods[..=places];
         for (likelihood, place) in found {
@@ -131,15 +132,15 @@ impl PrefilterGroup {
     /// After the first touch, from its likelihood at each place. One place in `stride` stands for
     /// all.
     pub(crate) fn new(
-        (object, rotation): (ObjectId, u16),
-        known: Arc<LibraryEntry>,
+        (of, rotation): (VariantId, u16),
+        known: Arc<IndexedModel>,
         each: f64,
         stride: usize,
         likelihoods: &[f32],
     ) -> Self {
         let scale = to_f32(each);
         let mut group = Self {
-            object,
+            of,
             rotation,
             known,
             each,
@@ -160,7 +161,7 @@ impl PrefilterGroup {
     }
 
     /// The model at the first touch.
-    pub(crate) fn known(&self) -> &LibraryEntry {
+    pub(crate) fn known(&self) -> &IndexedModel {
         &self.known
     }
 
@@ -175,7 +176,7 @@ impl PrefilterGroup {
         supported: &mut [f32],
     ) {
         let contact = touch.percepts.contact;
-        let indexed = &self.known.indexed;
+        let indexed = &*self.known;
         let packed = &indexed.packed;
         let drift = (contact.drift_sd_m.powi(2) - first.drift_sd_m.powi(2)).max(0.0);
         let noise = contact.position_sd_m.powi(2) + packed.variance_m2;
@@ -186,7 +187,7 @@ impl PrefilterGroup {
             return;
         }
         lists.find(packed, self.some.as_deref(), packed.nearest(variance), step);
-        lists.evaluate(packed, self.object, &touch.percepts.at(indexed, rotation));
+        lists.evaluate(packed, self.of, &touch.percepts.at(indexed, rotation));
         let per = to_f32(-0.5 / variance);
         let area = TAU * variance;
         let peak = share(indexed.places.len()) / (touch.outlier * area * area.sqrt());
@@ -216,14 +217,15 @@ impl PrefilterGroup {
         rotation: &UnitQuaternion<f64>,
         first: &ContactPercepts<'_>,
     ) -> TranslationHypothesis {
-        let indexed = &self.known.indexed;
+        let indexed = &*self.known;
         let packed_place = { self.some.as_ref() }.map_or(seed, |some| some[seed] as usize);
         let place = &indexed.places[indexed.packed.place(packed_place)];
         let contact = first.contact;
         let local = first.at(indexed, rotation);
         let likelihood = local.likelihood(packed_place, &indexed.packed.all[packed_place]);
         TranslationHypothesis {
-            object: self.object,
+            object: self.of.object,
+            variant: self.of.variant,
             rotation: self.rotation,
             translation: place.position.coords - rotation * contact.position_m.coords,
             variance_m2: contact.variance_m2() + place.variance_m2,

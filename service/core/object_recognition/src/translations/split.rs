@@ -95,7 +95,7 @@ impl SplitBuffers {
             let error = shared.as_ref();
             densities = (self.search).conditioned(indexed, error, [prior, noise], candidates);
         }
-        let unpredicted = touch.unpredicted(hypothesis.object, indexed, &point, one * densities);
+        let unpredicted = touch.unpredicted(hypothesis.of(), indexed, &point, one * densities);
         let beyond = unpredicted.map_or(0.0, |own| own.density);
         let outlier = (touch.outlier + beyond) / one;
         let total = outlier + densities;
@@ -151,9 +151,8 @@ impl SplitBuffers {
         touch: &TouchUpdate<'_>,
         parts: &mut Vec<TranslationHypothesis>,
     ) {
-        let maps = |own: &TranslationHypothesis| (own.object, own.rotation);
-        for own in all.chunk_by(|a, b| maps(a) == maps(b)) {
-            let Some(indexed) = library.indexed(own[0].object) else {
+        for own in all.chunk_by(|a, b| a.map() == b.map()) {
+            let Some(indexed) = library.variant(own[0].of()) else {
                 continue;
             };
             let rotation = &rotations[usize::from(own[0].rotation)];

@@ -8,9 +8,10 @@ use crate::contact::{Contact, LevelReading};
 use crate::indexed_model::IndexedModel;
 use crate::interpolation::Part;
 use crate::level_prior::{LevelPrior, RatedLevel};
-use crate::library::{ObjectId, ObjectLibrary};
+use crate::library::ObjectLibrary;
 use crate::percept_likelihood::ContactPercepts;
 use crate::tuning::OUTLIER_SHARE;
+use crate::variant::VariantId;
 
 /// A touch, with what its update of every hypothesis shares.
 #[derive(Debug)]
@@ -27,7 +28,7 @@ pub(crate) struct TouchUpdate<'a> {
     /// Density of outliers times their share \[1/m³\].
     pub(crate) outlier: f64,
     /// Densities of a contact with what the models do not predict.
-    pub(crate) unexplored: &'a BTreeMap<ObjectId, UnpredictedDensity>,
+    pub(crate) unexplored: &'a BTreeMap<VariantId, UnpredictedDensity>,
 }
 
 /// A level of a touch, and that of the nearest contact before on the same channel.
@@ -61,7 +62,7 @@ impl<'a> TouchUpdate<'a> {
     pub(crate) fn new(
         library: &'a ObjectLibrary,
         (before, contact): (&'a [Contact], &'a Contact),
-        unexplored: &'a BTreeMap<ObjectId, UnpredictedDensity>,
+        unexplored: &'a BTreeMap<VariantId, UnpredictedDensity>,
     ) -> Self {
         let level_prior = library.level_prior();
         let (last, nearest) = { before.last() }
@@ -89,16 +90,16 @@ impl<'a> TouchUpdate<'a> {
         }
     }
 
-    /// The touch at a point, if it is one of what the model of an object does not predict;
+    /// The touch at a point, if it is one of what a model does not predict;
     /// `explored` is the density of what it does. None where nothing is known of that.
     pub(crate) fn unpredicted(
         &self,
-        object: ObjectId,
+        of: VariantId,
         indexed: &IndexedModel,
         point: &Point3<f64>,
         explored: f64,
     ) -> Option<Unpredicted> {
-        let density = self.unexplored.get(&object);
+        let density = self.unexplored.get(&of);
         let (density, open) = density.zip(indexed.open.as_ref())?;
         if explored >= density.gap.max(density.open) {
             return Some(Unpredicted::default());

@@ -6,12 +6,13 @@ use nalgebra::UnitQuaternion;
 
 use crate::contact::Contact;
 use crate::level_prior::likelihood_below_one;
-use crate::library::{ObjectId, ObjectLibrary};
+use crate::library::ObjectLibrary;
 use crate::numeric::log_sum;
 use crate::translations::background::UnknownContact;
 use crate::translations::hypothesis::{Falls, TranslationHypothesis};
 use crate::translations::touch_update::UnpredictedDensity;
 use crate::tuning::{ENTER_MIN, PREFILTER_CONTACTS_MAX};
+use crate::variant::VariantId;
 
 /// Where an episode may have been that knows no place of an object: on what was not explored of it.
 ///
@@ -22,17 +23,17 @@ use crate::tuning::{ENTER_MIN, PREFILTER_CONTACTS_MAX};
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Unexplored {
     /// Log of the mass of the episodes that were nowhere else so far.
-    pub(crate) logs: BTreeMap<ObjectId, f64>,
+    pub(crate) logs: BTreeMap<VariantId, f64>,
     /// Densities of the contacts after the first, as far as seeds may be promoted by them.
-    pub(crate) history: Vec<BTreeMap<ObjectId, UnpredictedDensity>>,
+    pub(crate) history: Vec<BTreeMap<VariantId, UnpredictedDensity>>,
 }
 
 impl Unexplored {
     /// After the first contact.
     pub(crate) fn new(library: &ObjectLibrary) -> Self {
         let logs = library
-            .indexed_models()
-            .filter_map(|(object, indexed)| Some((object, indexed.open.as_ref()?.unexplored.ln())));
+            .variants()
+            .filter_map(|(of, indexed)| Some((of, indexed.open.as_ref()?.unexplored.ln())));
         Self {
             logs: logs.collect(),
             history: Vec::new(),
@@ -50,8 +51,8 @@ impl Unexplored {
         library: &ObjectLibrary,
         (last, contact): (&Contact, &Contact),
         unknown: Option<&UnknownContact>,
-        share: impl Fn(ObjectId) -> f64,
-    ) -> BTreeMap<ObjectId, UnpredictedDensity> {
+        share: impl Fn(VariantId) -> f64,
+    ) -> BTreeMap<VariantId, UnpredictedDensity> {
         let Some(unknown) = unknown else {
             return BTreeMap::new();
         };
@@ -60,18 +61,18 @@ impl Unexplored {
         let logs = unknown.of_objects.values();
         let least = logs.map(|logs| logs.alike.max(logs.bare).max(logs.changing()));
         let least = least.fold(f64::INFINITY, f64::min);
-        let densities = self.logs.keys().filter_map(|object| {
-            let indexed = library.indexed(*object)?;
+        let densities = self.logs.keys().filter_map(|of| {
+            let indexed = library.variant(*of)?;
             let own = &indexed.own_levels;
             let alike = likelihood_below_one(contact, own, library.level_prior());
             let step_m = (contact.position_m - last.position_m).norm();
             let stay = indexed.open.as_ref()?.stay(step_m);
-            let density = |log: f64| stay * alike * (log + share(*object)).exp();
+            let density = |log: f64| stay * alike * (log + share(*of)).exp();
             let density = UnpredictedDensity {
                 gap: density(unknown.log),
                 open: density(least),
             };
-            Some((*object, density))
+            Some((*of, density))
         });
         densities.collect()
     }
@@ -83,15 +84,15 @@ impl Unexplored {
         library: &ObjectLibrary,
         rotations: &[UnitQuaternion<f64>],
         (last, contact): (&Contact, &Contact),
-        bare: impl Fn(ObjectId) -> Option<f64>,
+        bare: impl Fn(VariantId) -> Option<f64>,
         least_log: f64,
         parts: &mut Vec<TranslationHypothesis>,
     ) {
-        for (&object, log) in &self.logs {
-            let Some(indexed) = library.indexed(object).filter(|_| log.is_finite()) else {
+        for (&of, log) in &self.logs {
+            let Some(indexed) = library.variant(of).filter(|_| log.is_finite()) else {
                 continue;
             };
-            let (Some(open), Some(bare)) = (&indexed.open, bare(object)) else {
+            let (Some(open), Some(bare)) = (&indexed.open, bare(of)) else {
                 continue;
             };
             let ways = (open.entries().len() * rotations.len()).max(1) as f64;
@@ -106,7 +107,8 @@ impl Unexplored {
                 }
                 for (rotation, turn) in (0u16..).zip(rotations) {
                     parts.push(TranslationHypothesis {
-                        object,
+                        object: of.object,
+                        variant: of.variant,
                         rotation,
                         translation: place.position.coords - turn * contact.position_m.coords,
                         variance_m2: contact.variance_m2() + place.variance_m2 + open.entry_m2(),
@@ -118,17 +120,17 @@ impl Unexplored {
         }
     }
 
-    /// Multiplies the masses of each object by e^`log`.
-    pub(crate) fn resize(&mut self, log: impl Fn(ObjectId) -> f64) {
-        for (object, own) in &mut self.logs {
-            *own += log(*object);
+    /// Multiplies the masses of each model by e^`log`.
+    pub(crate) fn resize(&mut self, log: impl Fn(VariantId) -> f64) {
+        for (of, own) in &mut self.logs {
+            *own += log(*of);
         }
     }
 
     /// A contact lay there.
-    pub(crate) fn stayed(&mut self, densities: BTreeMap<ObjectId, UnpredictedDensity>) {
-        for (object, log) in &mut self.logs {
-            let density = densities.get(object).copied().unwrap_or_default();
+    pub(crate) fn stayed(&mut self, densities: BTreeMap<VariantId, UnpredictedDensity>) {
+        for (of, log) in &mut self.logs {
+            let density = densities.get(of).copied().unwrap_or_default();
             *log += density.open.ln();
         }
         if self.history.len() <= PREFILTER_CONTACTS_MAX {
@@ -136,10 +138,10 @@ impl Unexplored {
         }
     }
 
-    /// Adds their masses to those of the objects.
-    pub(crate) fn add_to(&self, sums: &mut BTreeMap<ObjectId, f64>) {
-        for (object, log) in &self.logs {
-            let sum = sums.entry(*object).or_insert(f64::NEG_INFINITY);
+    /// Adds their masses to those of the models.
+    pub(crate) fn add_to(&self, sums: &mut BTreeMap<VariantId, f64>) {
+        for (of, log) in &self.logs {
+            let sum = sums.entry(*of).or_insert(f64::NEG_INFINITY);
             *sum = log_sum([*sum, *log].into_iter());
         }
     }

@@ -11,7 +11,7 @@ use crate::library::{ObjectId, ObjectLibrary};
 use crate::numeric::log_sum;
 use crate::percept_likelihood::ContactPercepts;
 use crate::translations::candidates::CandidateSearch;
-use crate::tuning::{BACKGROUND_WEIGHT_MIN, OUTLIER_SHARE};
+use crate::tuning::{APART_MIN, BACKGROUND_WEIGHT_MIN, ERROR_REACH, OUTLIER_SHARE};
 
 /// Logs of one contact, or sums over several, by what an unknown object's percepts are like.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -80,7 +80,7 @@ pub(super) fn unknown_contact(
     let mut nearby = CandidateSearch::default();
     let mut turns = rotations.iter().cycle();
     for sample in library.samples() {
-        let (Some(indexed), Some(rotation)) = (library.indexed(sample.object), turns.next()) else {
+        let (Some(indexed), Some(rotation)) = (library.variant(sample.of), turns.next()) else {
             continue;
         };
         let number = sample.packed_place as usize;
@@ -98,7 +98,11 @@ pub(super) fn unknown_contact(
         let densities = if compares {
             let place = &indexed.places[indexed.packed.place(number)];
             let changed = changed((other, contact), place);
-            let changed = ContactPercepts::in_measure_of(&changed, contact, level_prior);
+            let mut changed = ContactPercepts::in_measure_of(&changed, contact, level_prior);
+            if place.prediction.is_some() {
+                let correlation = indexed.error_correlation(step.norm_squared(), ERROR_REACH);
+                changed = changed.counting((2.0 * (1.0 - correlation)).max(APART_MIN));
+            }
             let locals = [&whole, &bare, &changed.at(indexed, rotation)];
             nearby.densities(&indexed.packed, &point, noise, locals)
         } else {
@@ -106,7 +110,7 @@ pub(super) fn unknown_contact(
             let [whole, bare] = nearby.densities(&indexed.packed, &point, noise, locals);
             [whole, bare, bare]
         };
-        let sums = sums.entry(sample.object).or_default();
+        let sums = sums.entry(sample.of.object).or_default();
         let weights = [weights[0], weights[1], weights[1]];
         for ((sums, weight), density) in sums.iter_mut().zip(weights).zip(densities) {
             let density = density / TAU.powf(1.5);
@@ -140,11 +144,16 @@ pub(super) fn unknown_contact(
 
 /// A contact as it would be if the one before had had the levels of a place: with these, changed as
 /// from the one before to it, and without what that does not tell.
+///
+/// What is predicted at two places errs alike, as far as their errors are correlated: their
+/// difference has 2 (1 − ρ) times the variance of one, which is that of the place to come.
 fn changed((before, now): (&Contact, &Contact), place: &IndexedPlace) -> Contact {
+    let is_felt = place.prediction.is_none();
     let levels = now.levels.iter().filter_map(|reading| {
         let before = before.level(reading.channel)?;
         let own = place.level(reading.channel)?;
-        let variance = own.variance() + before.sd * before.sd + reading.sd * reading.sd;
+        let known = if is_felt { own.variance() } else { 0.0 };
+        let variance = known + before.sd * before.sd + reading.sd * reading.sd;
         Some(LevelReading {
             channel: reading.channel,
             value: own.mean + reading.value - before.value,
