@@ -12,6 +12,7 @@ use crate::numeric::log_sum;
 use crate::percept_likelihood::ContactPercepts;
 use crate::translations::candidates::CandidateSearch;
 use crate::tuning::{APART_MIN, BACKGROUND_WEIGHT_MIN, ERROR_REACH, OUTLIER_SHARE};
+use crate::variant::Variant;
 
 /// Logs of one contact, or sums over several, by what an unknown object's percepts are like.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -97,9 +98,10 @@ pub(super) fn unknown_contact(
         let point = sample.position + rotation * step;
         let densities = if compares {
             let place = &indexed.places[indexed.packed.place(number)];
-            let changed = changed((other, contact), place);
+            let are_alike = sample.of.variant == Variant::Body && place.prediction.is_some();
+            let changed = changed((other, contact), place, are_alike);
             let mut changed = ContactPercepts::in_measure_of(&changed, contact, level_prior);
-            if place.prediction.is_some() {
+            if are_alike {
                 let correlation = indexed.error_correlation(step.norm_squared(), ERROR_REACH);
                 changed = changed.counting((2.0 * (1.0 - correlation)).max(APART_MIN));
             }
@@ -145,14 +147,14 @@ pub(super) fn unknown_contact(
 /// A contact as it would be if the one before had had the levels of a place: with these, changed as
 /// from the one before to it, and without what that does not tell.
 ///
-/// What is predicted at two places errs alike, as far as their errors are correlated: their
-/// difference has 2 (1 − ρ) times the variance of one, which is that of the place to come.
-fn changed((before, now): (&Contact, &Contact), place: &IndexedPlace) -> Contact {
-    let is_felt = place.prediction.is_none();
+/// Predictions of which neighbouring levels tell little err alike, as far as their errors are
+/// correlated: the difference of two has 2 (1 − ρ) times the variance of one, which is that of the
+/// place to come. Then `are_alike`, and the place's own is left out.
+fn changed((before, now): (&Contact, &Contact), place: &IndexedPlace, are_alike: bool) -> Contact {
     let levels = now.levels.iter().filter_map(|reading| {
         let before = before.level(reading.channel)?;
         let own = place.level(reading.channel)?;
-        let known = if is_felt { own.variance() } else { 0.0 };
+        let known = if are_alike { 0.0 } else { own.variance() };
         let variance = known + before.sd * before.sd + reading.sd * reading.sd;
         Some(LevelReading {
             channel: reading.channel,
