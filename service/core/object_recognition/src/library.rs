@@ -9,13 +9,10 @@ use nalgebra::Point3;
 use crate::indexed_model::IndexedModel;
 use crate::level_prior::{LevelPrior, level_prior};
 use crate::model::ObjectModel;
+use crate::object_id::ObjectId;
 use crate::surfels::map::PerceptContext;
 use crate::tuning::{ANSWER_PROBABILITY, BACKGROUND_SAMPLES};
 use crate::variant::{Variant, VariantId, body_priors};
-
-/// Number of an object, chosen by the caller.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ObjectId(pub u32);
 
 /// One model with the indexes of its variants.
 #[derive(Debug)]

@@ -3,7 +3,7 @@
 use geometry::PoseCovariance;
 use nalgebra::Isometry3;
 
-use crate::library::ObjectId;
+use crate::object_id::ObjectId;
 
 /// Answer of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -109,8 +109,11 @@ pub(crate) const APART_MIN: f64 = 1e-3;
 pub(crate) const EARNED_MAX: usize = 6;
 /// Least probability that a contact is the first one on what was explored. Chosen.
 pub(crate) const ENTER_MIN: f64 = 0.01;
-/// Probability below which a variant of an object is dropped. Chosen.
-pub(crate) const VARIANT_PROBABILITY_MIN: f64 = 0.01;
+/// Probability of an uncertain body from which on it is a variant of its object. Chosen.
+pub(crate) const BODY_PRIOR_MIN: f64 = 0.05;
+/// Probability that what was touched at random is touched at the same points again, at least.
+/// Chosen.
+pub(crate) const TOUCHED_AGAIN_MIN: f64 = 0.01;
 /// Share of contacts that fall evenly over a surface, and not on its places alone, below which
 /// nothing stands between these; so many may lie there all the same. Hands that feel a surface
 /// anywhere have a share from a third to one, those that reach for the same points again less than

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::library::ObjectId;
 use crate::numeric::log_sum;
-use crate::tuning::VARIANT_PROBABILITY_MIN;
+use crate::object_id::ObjectId;
+use crate::tuning::{BODY_PRIOR_MIN, TOUCHED_AGAIN_MIN};
 
 /// What lies between the places of an object, where more than one may be true.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -49,13 +49,10 @@ pub(crate) fn body_priors(
     let all_log = log_sum([chosen_log, each_log, 0.0].into_iter());
     let prior = |(object, log)| {
         let own = log_sum([0.0, each_log - either(log)].into_iter()) - all_log;
-        // What was touched at random may still be touched at the same points again.
-        (object, own.min((1.0 - VARIANT_PROBABILITY_MIN).ln()))
+        (object, own.min((1.0 - TOUCHED_AGAIN_MIN).ln()))
     };
     let priors = chosen_logs.map(prior);
-    priors
-        .filter(|own| own.1 > VARIANT_PROBABILITY_MIN.ln())
-        .collect()
+    priors.filter(|own| own.1 > BODY_PRIOR_MIN.ln()).collect()
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@ use nalgebra::{Isometry3, Point3};
 
 use crate::contact::Contact;
 use crate::indexed_model::IndexedModel;
-use crate::library::{ObjectId, ObjectLibrary};
+use crate::library::ObjectLibrary;
+use crate::object_id::ObjectId;
 use crate::poses::goodness_of_fit;
 use crate::poses::hypothesis::PoseHypothesis;
 use crate::poses::search::PoseSearch;

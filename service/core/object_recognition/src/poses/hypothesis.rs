@@ -3,7 +3,7 @@
 use geometry::se3;
 use nalgebra::{Isometry3, Matrix6};
 
-use crate::library::ObjectId;
+use crate::object_id::ObjectId;
 use crate::tuning::{NEAR_EXTENT, NEAR_RAD, SAME_POSE};
 
 /// One hypothesis.

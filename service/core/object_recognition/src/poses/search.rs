@@ -6,7 +6,7 @@
 use nalgebra::Isometry3;
 
 use crate::contact::Contact;
-use crate::library::ObjectId;
+use crate::object_id::ObjectId;
 use crate::poses::hypothesis::PoseHypothesis;
 use crate::surfels::map::{PerceptContext, SurfelMap};
 use crate::surfels::point_pairs::{PointPair, PointPairTable};

@@ -6,9 +6,10 @@ use nalgebra::Point3;
 
 use crate::contact::{Contact, Reached};
 use crate::indexed_model::IndexedModel;
-use crate::library::{ObjectId, ObjectLibrary};
+use crate::library::ObjectLibrary;
 use crate::next_touch::{NextTouch, WeightedPose, next_touch};
 use crate::numeric::log_sum;
+use crate::object_id::ObjectId;
 use crate::orientation::Orientation;
 use crate::poses::PoseHypotheses;
 use crate::posterior::{Posterior, entropy_nats};

@@ -3,8 +3,9 @@
 use nalgebra::Point3;
 
 use crate::contact::Contact;
-use crate::library::{ObjectId, ObjectLibrary};
+use crate::library::ObjectLibrary;
 use crate::model::ObjectModel;
+use crate::object_id::ObjectId;
 use crate::orientation::Orientation;
 use crate::posterior::{PoseEstimate, Posterior};
 use crate::recognition::Recognition;

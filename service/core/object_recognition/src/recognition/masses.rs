@@ -6,8 +6,9 @@ use std::f64::consts::PI;
 use geometry::{PoseCovariance, se3, symmetric};
 use nalgebra::{Isometry3, Matrix6, Translation3, Vector3, Vector6};
 
-use crate::library::{ObjectId, ObjectLibrary};
+use crate::library::ObjectLibrary;
 use crate::numeric::log_sum;
+use crate::object_id::ObjectId;
 use crate::poses::PoseHypothesis;
 use crate::posterior::PoseEstimate;
 use crate::recognition::episode::Hypotheses;

@@ -6,7 +6,8 @@ use std::f64::consts::{FRAC_PI_6, PI};
 use nalgebra::Isometry3;
 
 use crate::interpolation::UnpredictedGaps;
-use crate::library::{ObjectId, ObjectLibrary};
+use crate::library::ObjectLibrary;
+use crate::object_id::ObjectId;
 use crate::recognition::dependence::evidence_share;
 use crate::recognition::episode::Hypotheses;
 use crate::recognition::episode::Recognition;

@@ -6,8 +6,9 @@ use std::f64::consts::LN_2;
 use nalgebra::UnitQuaternion;
 
 use crate::contact::Contact;
-use crate::library::{ObjectId, ObjectLibrary};
+use crate::library::ObjectLibrary;
 use crate::numeric::log_sum;
+use crate::object_id::ObjectId;
 use crate::translations::unknown_contact::{PerceptLogs, unknown_contact};
 
 /// Log-likelihoods of the contacts under an unknown object.

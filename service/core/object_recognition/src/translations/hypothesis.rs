@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::library::ObjectId;
+use crate::object_id::ObjectId;
 use crate::tuning::MERGE_CELL_SD;
 use crate::variant::{Variant, VariantId};
 

@@ -81,7 +81,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::library::ObjectId;
+    use crate::object_id::ObjectId;
     use crate::variant::Variant;
 
     fn hypothesis(object: u32, x: f64, evidence: f64) -> TranslationHypothesis {

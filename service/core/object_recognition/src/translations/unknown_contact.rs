@@ -7,8 +7,9 @@ use nalgebra::UnitQuaternion;
 
 use crate::contact::{Contact, LevelReading};
 use crate::indexed_place::IndexedPlace;
-use crate::library::{ObjectId, ObjectLibrary};
+use crate::library::ObjectLibrary;
 use crate::numeric::log_sum;
+use crate::object_id::ObjectId;
 use crate::percept_likelihood::ContactPercepts;
 use crate::translations::candidates::CandidateSearch;
 use crate::tuning::{APART_MIN, BACKGROUND_WEIGHT_MIN, ERROR_REACH, OUTLIER_SHARE};
