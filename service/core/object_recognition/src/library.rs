@@ -114,7 +114,8 @@ impl ObjectLibrary {
         removed
     }
 
-    /// A library of some of these objects, each under a new number; what is supposed of them stays.
+    /// A library of some of these objects, each under a new number. The priors of their bodies
+    /// stay.
     #[must_use]
     pub fn select(&self, objects: impl IntoIterator<Item = (ObjectId, ObjectId)>) -> Self {
         let mut selected = Self::answering_from(self.answer_probability);

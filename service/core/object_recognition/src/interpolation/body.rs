@@ -11,8 +11,8 @@ use super::tails;
 use super::taken::Taken;
 use super::tuning::{
     BODY_FOLD_STEPS, BODY_FOLDS, BODY_MISSED_SDS, BODY_PROBABILITY_MIN, CHOSEN_RATIO_SD, CORE_MAX,
-    REGULARITY_SD, SIDE_NORMAL_COS, SIDE_PROBABILITY_MIN, SIDE_SAMPLES, SIDE_SAMPLES_APART,
-    UNEXPECTED_SHARE,
+    REGULARITY_MAX, REGULARITY_SD, SIDE_NORMAL_COS, SIDE_PROBABILITY_MIN, SIDE_SAMPLES,
+    SIDE_SAMPLES_APART, UNEXPECTED_SHARE,
 };
 use crate::model::ModelPlace;
 
@@ -183,9 +183,11 @@ fn regularity(form: &Superellipsoid, points: &[Point3<f64>], spacing_m: f64) -> 
     if within > CORE_MAX {
         return None;
     }
-    let beyond = 1.0 + within - 0.752_25 * within.powf(1.5) + 0.5 * within * within;
+    let half = 4.0 / (3.0 * PI.sqrt()) * within.powf(1.5);
+    let beyond = 1.0 + within - half + 0.5 * within * within;
     let off_m = nearest_m.sum::<f64>() / count - 0.5 * side_m / count.sqrt() * beyond;
-    Some(off_m * count / (REGULARITY_SD * side_m))
+    // One object that is beyond all measure must not tell of the others.
+    Some(off_m * count / (REGULARITY_SD * side_m)).filter(|off| off.abs() < REGULARITY_MAX)
 }
 
 /// Log-likelihood ratio of places that were chosen, and lie so many deviations farther apart than

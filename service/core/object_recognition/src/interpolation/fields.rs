@@ -60,7 +60,7 @@ impl FieldVariants {
             .iter()
             .map(|(_, field)| field.predicted_nats(&anywhere, places));
         let told_nats = told.fold(f64::INFINITY, f64::min);
-        // Levels of which those around tell less than nothing are in no field.
+        // Where the levels around mislead, nothing is predicted.
         if told_nats < 0.0 {
             return Self::default();
         }

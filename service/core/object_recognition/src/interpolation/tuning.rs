@@ -84,6 +84,8 @@ pub(super) const BODY_NATS: f64 = 5.0;
 /// Deviation of the mean distance of random points to their nearest, for as many as one on a square
 /// of side one (Clark and Evans 1954). Derived.
 pub(super) const REGULARITY_SD: f64 = 0.261_36;
+/// Most deviations by which distances are compared. Derived: their square stays finite.
+pub(super) const REGULARITY_MAX: f64 = 1e6;
 /// Share of random points that lie within a spacing of others, to the first order, beyond which
 /// places tell little of how they were touched. Chosen.
 pub(super) const CORE_MAX: f64 = 0.5;

@@ -30,18 +30,23 @@ fn a_hand_that_rests_on_a_known_box_calls_it_nothing_else() {
     }
 }
 
+/// The verdicts of walks over such boxes, of so many contacts each.
+fn verdicts(library: &ObjectLibrary, boxes: std::ops::Range<u64>, contacts: u64) -> Vec<Verdict> {
+    let verdict = |box_number| {
+        let mut recognition = Recognition::new(&Orientation::Known);
+        for contact in run_over(WAVES, box_number, contacts) {
+            recognition.touch(library, contact);
+        }
+        recognition.posterior(library).verdict()
+    };
+    boxes.map(verdict).collect()
+}
+
 #[test]
 fn boxes_of_sixty_contacts_are_named_by_a_walk() {
     let library = taught(WAVES, 0..4, 60);
-    let verdict = |box_number| {
-        let mut recognition = Recognition::new(&Orientation::Known);
-        for contact in run_over(WAVES, box_number, 100) {
-            recognition.touch(&library, contact);
-        }
-        recognition.posterior(&library).verdict()
-    };
-    let own: Vec<Verdict> = (0..4).map(verdict).collect();
-    let others: Vec<Verdict> = (1000..1004).map(verdict).collect();
+    let own = verdicts(&library, 0..4, 100);
+    let others = verdicts(&library, 1000..1004, 100);
     for (id, verdict) in (0..).zip(&own) {
         assert_eq!(*verdict, Verdict::Object(ObjectId(id)), "{own:?}");
     }
@@ -53,19 +58,12 @@ fn boxes_of_sixty_contacts_are_named_by_a_walk() {
 #[test]
 fn most_boxes_of_twenty_contacts_are_named_by_a_long_walk() {
     let library = taught(WAVES, 0..6, 20);
-    let verdict = |box_number| {
-        let mut recognition = Recognition::new(&Orientation::Known);
-        for contact in run_over(WAVES, box_number, 150) {
-            recognition.touch(&library, contact);
-        }
-        recognition.posterior(&library).verdict()
-    };
-    let own: Vec<Verdict> = (0..6).map(verdict).collect();
+    let own = verdicts(&library, 0..6, 150);
     let mut right = 0;
     for (id, verdict) in (0..).zip(&own) {
         right += u32::from(*verdict == Verdict::Object(ObjectId(id)));
     }
-    let others: Vec<Verdict> = (1000..1006).map(verdict).collect();
+    let others = verdicts(&library, 1000..1006, 150);
     let named = |verdict: &Verdict| matches!(verdict, Verdict::Object(_));
     let wrong = own.iter().filter(|own| named(own)).count() - right as usize;
     assert!(right >= 5 && wrong == 0, "{own:?}");
