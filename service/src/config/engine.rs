@@ -49,8 +49,8 @@ section! {
         /// Time between checkpoints while samples come in \[s\].
         checkpoint_interval_s: f64 =
             EngineSettings::default().checkpoint_interval.as_secs_f64(), INTERVAL_S;
-        /// Threads that relax the past beside the writers of all spaces; 0 leaves it to the
-        /// writers.
+        /// Threads that relax the past and index objects beside the writers of all spaces; 0
+        /// leaves it to the writers.
         relaxation_threads: usize = EngineSettings::default().relaxation_threads, THREADS;
     }
 }

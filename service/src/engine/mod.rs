@@ -25,7 +25,6 @@ mod queue;
 mod readiness;
 mod recovery;
 mod refinement;
-mod relaxers;
 mod removal;
 mod repair;
 mod route_bounds;
@@ -37,6 +36,7 @@ mod shared;
 mod space;
 mod trajectory;
 mod unavailable;
+mod workers;
 mod writer;
 
 #[cfg(test)]
@@ -190,11 +190,11 @@ impl Engine {
         publisher: Arc<dyn Publisher>,
         follows: bool,
     ) -> Self {
-        let (relaxers, threads) = relaxers::start(settings.relaxation_threads);
+        let (workers, threads) = workers::start(settings.relaxation_threads);
         let spaces_max = settings.spaces_max;
         let common = Common {
             publisher,
-            relaxers,
+            workers,
             questions: QuestionRoom::default(),
             settings,
             follows,

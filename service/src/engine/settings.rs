@@ -26,7 +26,8 @@ pub struct EngineSettings {
     pub commit_interval: Duration,
     /// Time between checkpoints while samples come in.
     pub checkpoint_interval: Duration,
-    /// Threads that relax the past of all spaces; 0 leaves it to the spaces' writers.
+    /// Threads that relax the past and index objects of all spaces; 0 leaves it to the spaces'
+    /// writers.
     pub relaxation_threads: usize,
 }
 

@@ -11,9 +11,9 @@ use metrics::gauge;
 use super::health::Health;
 use super::publisher::Publisher;
 use super::question::QuestionRoom;
-use super::relaxers::Relaxers;
 use super::shared::Surroundings;
 use super::space::Space;
+use super::workers::Workers;
 use super::{EngineSettings, SpaceError, checkpointer, committer, stored_settings};
 use crate::metrics::SPACE_STOPPED;
 use crate::store::{Store, StoreError, StoredSpace};
@@ -22,7 +22,7 @@ use crate::store::{Store, StoreError, StoredSpace};
 #[derive(Clone, Debug)]
 pub(super) struct Common {
     pub(super) publisher: Arc<dyn Publisher>,
-    pub(super) relaxers: Relaxers,
+    pub(super) workers: Workers,
     pub(super) questions: QuestionRoom,
     pub(super) settings: EngineSettings,
     /// Whether the shards are other processes', and are only followed.
@@ -70,7 +70,7 @@ impl Shard {
             health: Arc::clone(&health),
             commits,
             jobs,
-            relaxers: common.relaxers.clone(),
+            workers: common.workers.clone(),
             questions: common.questions.clone(),
             settings,
             follows: common.follows,

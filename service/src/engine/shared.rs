@@ -19,11 +19,11 @@ use super::live::Live;
 use super::publisher::Publisher;
 use super::question::QuestionRoom;
 use super::refinement::Refinements;
-use super::relaxers::Relaxers;
 use super::route_bounds::RouteBoundsOfSpace;
 use super::session_bound::SessionBound;
 use super::settings::EngineSettings;
 use super::unavailable::Unavailable;
+use super::workers::Workers;
 use crate::metrics::SPACE_STOPPED;
 use crate::store::{SpaceNumber, Store};
 
@@ -85,7 +85,7 @@ pub(crate) struct Surroundings {
     pub(crate) health: Arc<Health>,
     pub(crate) commits: std::sync::mpsc::Sender<Commit>,
     pub(crate) jobs: std::sync::mpsc::Sender<Job>,
-    pub(crate) relaxers: Relaxers,
+    pub(crate) workers: Workers,
     pub(crate) questions: QuestionRoom,
     pub(crate) settings: EngineSettings,
     /// Whether another process writes the spaces.

@@ -95,15 +95,15 @@ fn summaries(map: &CognitiveMap, after: Option<&str>, limit: usize) -> Response<
         (status = 200, description = "The object", body = ObjectDetail),
         (status = 404, description = "There is no such space or object")))]
 pub(crate) async fn get(
+    State(service): State<Service>,
     ObjectOfPath(space, name): ObjectOfPath,
     _: NoQuery,
 ) -> Result<Response<Body>, Problem> {
     let map = space.snapshot().await?;
-    let label = Label::new(&name).ok();
-    label
-        .and_then(|label| detail(&map, &label))
-        .map(|object| reply::json(&object))
-        .ok_or_else(|| unknown("object", &name))
+    let label = Label::new(&name).map_err(|_| unknown("object", &name))?;
+    let object = detail(&service, map, label).await?;
+    let object = object.ok_or_else(|| unknown("object", &name))?;
+    Ok(reply::json(&object))
 }
 
 /// What the answer to a lesson tells beside the object.
@@ -127,6 +127,7 @@ pub(crate) struct TeachQuery {
         (status = 422, description = "The name or the lesson makes no sense"),
         (status = 507, description = "The store is full")))]
 pub(crate) async fn put(
+    State(service): State<Service>,
     ObjectOfPath(space, name): ObjectOfPath,
     Query(query): Query<TeachQuery>,
     Json(lesson): Json<ObjectLesson>,
@@ -135,9 +136,9 @@ pub(crate) async fn put(
     let valid = decode::lesson(&lesson)?;
     space.teach(&label, lesson, valid).await?;
     let map = space.snapshot().await?;
-    let mut taught = detail(&map, &label)
-        .ok_or_else(|| unknown("object", &name))?
-        .summary;
+    let object = detail(&service, map, label.clone()).await?;
+    let object = object.ok_or_else(|| unknown("object", &name))?;
+    let mut taught = object.summary;
     // The lesson is on disk, whether or not there is room for the question.
     if query.alike
         && let Ok((map, alike)) = space.alike(label).await
@@ -210,10 +211,18 @@ pub(crate) async fn of_agent(
     answered.await
 }
 
-fn detail(map: &CognitiveMap, name: &Label) -> Option<ObjectDetail> {
-    let id = map.object_by_name(name)?;
-    let object = map.objects().find(|(object, ..)| *object == id)?;
-    Some(encode::object_detail(map, object))
+/// An object of a name. How densely it was felt may have to be computed.
+async fn detail(
+    service: &Service,
+    map: Arc<CognitiveMap>,
+    name: Label,
+) -> Result<Option<ObjectDetail>, Problem> {
+    let made = service.long.make(move || {
+        let id = map.object_by_name(&name)?;
+        let object = map.objects().find(|(object, ..)| *object == id)?;
+        Some(encode::object_detail(&map, object))
+    });
+    made.await
 }
 
 /// The space that the path names, and the name of an object that may be there or not, or none that

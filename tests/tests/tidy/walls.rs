@@ -27,7 +27,7 @@ const MANIFESTS: [&str; 17] = [
 /// around it.
 const CORE: [(&str, &[&str]); 11] = [
     ("random", &[]),
-    ("simd", &["pulp"]),
+    ("simd", &["pulp", "wide"]),
     ("state", &["nalgebra", "thiserror"]),
     ("trajectory", &["geometry", "nalgebra", "thiserror"]),
     ("geometry", &["nalgebra", "state"]),

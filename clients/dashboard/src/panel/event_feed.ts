@@ -35,7 +35,9 @@ export function inWords({ kind, fields }: ShownEvent): string | null {
     case "percept_surprising":
       return `felt something surprising on ${text("channel")}`;
     case "objects_narrowed":
-      return `touches one of ${text("live")} objects`;
+      return Number(fields["live"]) === 1
+        ? "touches one known object, or a new one"
+        : `touches one of ${text("live")} objects`;
     case "object_recognised":
       return `recognised ${text("object")} (${percent(Number(fields["probability"]))})`;
     case "object_unknown":

@@ -29,7 +29,7 @@ pub use input::{
 pub use keyframes::{Guess, LearnedChannel, RelaxationJob, SampleKey, ViewChannel, ViewMatch};
 pub use memory::blockage::{BLOCKAGES_MAX, Ball, Blockage, BlockageId, Blocked};
 pub use memory::landmark::{Landmark, LandmarkId};
-pub use memory::object::{Identified, KnownObject};
+pub use memory::object::{Identified, IndexingJob, KnownObject};
 pub use memory::percept::{
     Channel, ChannelId, ChannelKind, Expected, FeltPercept, PerceptCue, Remembered,
 };

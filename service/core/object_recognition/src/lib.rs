@@ -7,6 +7,7 @@ mod indexed_place;
 mod interpolation;
 mod level_prior;
 mod library;
+mod library_entry;
 mod model;
 mod next_touch;
 mod numeric;

@@ -2,25 +2,18 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_6;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::Point3;
 
 use crate::indexed_model::IndexedModel;
 use crate::level_prior::{LevelPrior, level_prior};
+use crate::library_entry::LibraryEntry;
 use crate::model::ObjectModel;
 use crate::object_id::ObjectId;
 use crate::surfels::map::PerceptContext;
 use crate::tuning::{ANSWER_PROBABILITY, BACKGROUND_SAMPLES};
 use crate::variant::{Variant, VariantId, body_priors};
-
-/// One model with the indexes of its variants.
-#[derive(Debug)]
-struct LibraryEntry {
-    model: ObjectModel,
-    places: Arc<IndexedModel>,
-    body: Option<Arc<IndexedModel>>,
-}
 
 /// How densely an object was felt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,20 +45,27 @@ pub(crate) struct Sample {
     pub(crate) position: Point3<f64>,
 }
 
+/// What all models of a library tell together.
+#[derive(Debug)]
+struct Summary {
+    level_prior: Vec<LevelPrior>,
+    samples: Vec<Sample>,
+    extent_m: f64,
+}
+
 /// All models that an episode may be of, with their indexes.
 ///
-/// Putting a model builds its indexes, some milliseconds per thousand places. Recognition changes
-/// nothing here.
+/// Indexes are built when they are first needed, by whoever needs them, or before by whoever
+/// [prepares](Self::prepare) the library: a tenth of a second for hundreds of places. Recognition
+/// changes nothing here.
 #[derive(Clone, Debug)]
 pub struct ObjectLibrary {
     answer_probability: f64,
     /// Shared with the library's clones, so that a snapshot costs a pointer per object.
     objects: BTreeMap<ObjectId, Arc<LibraryEntry>>,
     /// Logs of the prior probabilities of the bodies that are uncertain.
-    body_priors: BTreeMap<ObjectId, f64>,
-    level_prior: Vec<LevelPrior>,
-    samples: Vec<Sample>,
-    extent_m: f64,
+    body_priors: OnceLock<Arc<BTreeMap<ObjectId, f64>>>,
+    summary: OnceLock<Arc<Summary>>,
 }
 
 impl Default for ObjectLibrary {
@@ -80,10 +80,8 @@ impl ObjectLibrary {
         Self {
             answer_probability,
             objects: BTreeMap::new(),
-            body_priors: BTreeMap::new(),
-            level_prior: Vec::new(),
-            samples: Vec::new(),
-            extent_m: 0.0,
+            body_priors: OnceLock::new(),
+            summary: OnceLock::new(),
         }
     }
 
@@ -95,23 +93,38 @@ impl ObjectLibrary {
     /// Puts a model in place of an earlier one of the same object. Running episodes keep the
     /// evidence that they have.
     pub fn put(&mut self, id: ObjectId, model: ObjectModel) {
-        let (places, body) = IndexedModel::variants(&model);
-        let entry = LibraryEntry {
-            model,
-            places: Arc::new(places),
-            body: body.map(Arc::new),
-        };
-        self.objects.insert(id, Arc::new(entry));
-        self.update_priors();
-        self.update_summary();
+        self.objects.insert(id, Arc::new(LibraryEntry::new(model)));
+        self.changed();
     }
 
     /// Removes an object; `true` if there was one.
     pub fn remove(&mut self, id: ObjectId) -> bool {
         let removed = self.objects.remove(&id).is_some();
-        self.update_priors();
-        self.update_summary();
+        self.changed();
         removed
+    }
+
+    /// What all models told together holds no more.
+    fn changed(&mut self) {
+        (self.body_priors, self.summary) = (OnceLock::new(), OnceLock::new());
+    }
+
+    /// Number of objects whose indexes nobody has begun to build.
+    pub fn unclaimed(&self) -> usize {
+        let unclaimed = self.objects.values().filter(|object| !object.is_claimed());
+        unclaimed.count()
+    }
+
+    /// Builds the indexes of an object that nobody has begun to; whether there was one. Threads
+    /// that do so at the same time take different ones.
+    pub fn index_one(&self) -> bool {
+        let next = self.objects.values().find(|object| object.claim());
+        next.map(|object| object.indexes()).is_some()
+    }
+
+    /// Builds all that recognition needs and that is not there yet.
+    pub fn prepare(&self) {
+        self.summary();
     }
 
     /// A library of some of these objects, each under a new number. The priors of their bodies
@@ -119,16 +132,15 @@ impl ObjectLibrary {
     #[must_use]
     pub fn select(&self, objects: impl IntoIterator<Item = (ObjectId, ObjectId)>) -> Self {
         let mut selected = Self::answering_from(self.answer_probability);
+        let mut body_priors = BTreeMap::new();
         for (id, number) in objects {
             if let Some(object) = self.objects.get(&id) {
                 selected.objects.insert(number, Arc::clone(object));
-                let prior_log = self.body_priors.get(&id);
-                selected
-                    .body_priors
-                    .extend(prior_log.map(|log| (number, *log)));
+                let prior_log = self.body_priors().get(&id);
+                body_priors.extend(prior_log.map(|log| (number, *log)));
             }
         }
-        selected.update_summary();
+        selected.body_priors = OnceLock::from(Arc::new(body_priors));
         selected
     }
 
@@ -140,7 +152,7 @@ impl ObjectLibrary {
     /// How densely an object was felt.
     pub fn density(&self, id: ObjectId) -> Option<Density> {
         let object = self.objects.get(&id)?;
-        let gap_m = object.places.gap_m;
+        let gap_m = object.indexes().places.gap_m;
         (gap_m > 0.0).then(|| Density {
             gap_m,
             contact_sd_m: object.model.noise_m2().sqrt(),
@@ -163,19 +175,34 @@ impl ObjectLibrary {
         self.objects.is_empty()
     }
 
-    fn update_priors(&mut self) {
-        let chosen_logs = { self.objects.iter() }.filter_map(|(id, object)| {
-            let body = object.body.as_ref().unwrap_or(&object.places);
-            Some((*id, body.chosen_log?))
-        });
-        let mut body_priors = body_priors(chosen_logs);
-        body_priors.retain(|id, _| self.objects[id].body.is_some());
-        self.body_priors = body_priors;
+    fn body_priors(&self) -> &BTreeMap<ObjectId, f64> {
+        self.body_priors.get_or_init(|| {
+            // Others may be building some: those that are left come before theirs.
+            while self.index_one() {}
+            let chosen_logs = { self.objects.iter() }.filter_map(|(id, object)| {
+                let indexes = object.indexes();
+                let body = indexes.body.as_ref().unwrap_or(&indexes.places);
+                Some((*id, body.chosen_log?))
+            });
+            let mut body_priors = body_priors(chosen_logs);
+            body_priors.retain(|id, _| self.objects[id].indexes().body.is_some());
+            Arc::new(body_priors)
+        })
     }
 
-    fn update_summary(&mut self) {
-        let extents = self.variants().map(|(_, indexed)| indexed.extent_m);
-        self.extent_m = extents.fold(0.0, f64::max);
+    fn summary(&self) -> &Summary {
+        self.summary.get_or_init(|| {
+            let extents = self.variants().map(|(_, indexed)| indexed.extent_m);
+            let own_levels = { self.likelier_models() }.flat_map(|(_, own)| &own.own_levels);
+            Arc::new(Summary {
+                extent_m: extents.fold(0.0, f64::max),
+                samples: self.sampled(),
+                level_prior: level_prior(own_levels),
+            })
+        })
+    }
+
+    fn sampled(&self) -> Vec<Sample> {
         let places = || {
             self.likelier_models().flat_map(|(of, indexed)| {
                 let count = u32::try_from(indexed.places.len()).unwrap_or(u32::MAX);
@@ -195,41 +222,41 @@ impl ObjectLibrary {
                 position: place.position,
             })
         };
-        self.samples = samples.filter_map(sample).collect();
-        let models = self.likelier_models().map(|(_, indexed)| indexed);
-        let prior = level_prior(models.flat_map(|indexed| &indexed.own_levels));
-        self.level_prior = prior;
+        samples.filter_map(sample).collect()
     }
 
     /// All objects, as their places tell.
     pub(crate) fn indexed_models(&self) -> impl Iterator<Item = (ObjectId, &IndexedModel)> {
         self.objects
             .iter()
-            .map(|(id, object)| (*id, &*object.places))
+            .map(|(id, object)| (*id, &*object.indexes().places))
     }
 
     /// An object, as its places tell.
     pub(crate) fn indexed(&self, id: ObjectId) -> Option<&IndexedModel> {
-        self.objects.get(&id).map(|object| &*object.places)
+        let object = self.objects.get(&id)?;
+        Some(&*object.indexes().places)
     }
 
     /// The variants of all objects with which an episode begins, by number.
     pub(crate) fn variants(&self) -> impl Iterator<Item = (VariantId, &Arc<IndexedModel>)> {
+        let body_priors = self.body_priors();
         self.objects.iter().flat_map(|(id, object)| {
-            let body = object.body.as_ref();
-            let body = body.filter(|_| self.body_priors.contains_key(id));
+            let indexes = object.indexes();
+            let body = indexes.body.as_ref();
+            let body = body.filter(|_| body_priors.contains_key(id));
             let [places_id, body_id] = VariantId::both(*id);
             let body = body.map(|body| (body_id, body));
-            [(places_id, &object.places)].into_iter().chain(body)
+            [(places_id, &indexes.places)].into_iter().chain(body)
         })
     }
 
     /// A variant of an object. A body that is none any more is what the places tell by now.
     pub(crate) fn variant(&self, id: VariantId) -> Option<&IndexedModel> {
-        let object = self.objects.get(&id.object)?;
-        let body = object.body.as_ref();
+        let indexes = self.objects.get(&id.object)?.indexes();
+        let body = indexes.body.as_ref();
         let body = body.filter(|_| id.variant == Variant::Body);
-        Some(body.unwrap_or(&object.places))
+        Some(body.unwrap_or(&indexes.places))
     }
 
     /// The likelier variant of each object.
@@ -239,7 +266,7 @@ impl ObjectLibrary {
 
     fn likelier(&self, object: ObjectId) -> Option<(VariantId, &IndexedModel)> {
         let [places, body] = VariantId::both(object);
-        let prior_log = self.body_priors.get(&object);
+        let prior_log = self.body_priors().get(&object);
         let is_body = prior_log.is_some_and(|log| *log > 0.5_f64.ln());
         let id = if is_body { body } else { places };
         Some((id, self.variant(id)?))
@@ -247,8 +274,9 @@ impl ObjectLibrary {
 
     /// Logs of the prior probabilities of these variants, given their objects.
     pub(crate) fn variant_priors(&self) -> BTreeMap<VariantId, f64> {
+        let body_priors = self.body_priors();
         let prior_log = |(id, _): (VariantId, _)| {
-            let body_log = self.body_priors.get(&id.object).copied();
+            let body_log = body_priors.get(&id.object).copied();
             let log = match id.variant {
                 Variant::Places => body_log.map_or(0.0, |log| (-log.exp_m1()).ln()),
                 Variant::Body => body_log.unwrap_or(f64::NEG_INFINITY),
@@ -262,18 +290,18 @@ impl ObjectLibrary {
     pub(crate) fn percept_context<'a>(&'a self, indexed: &'a IndexedModel) -> PerceptContext<'a> {
         PerceptContext {
             places: &indexed.places,
-            level_prior: &self.level_prior,
+            level_prior: self.level_prior(),
             clutter_per_m3: self.clutter_per_m3(),
         }
     }
 
     /// An even sample of the places of all models, for the background model.
     pub(crate) fn samples(&self) -> &[Sample] {
-        &self.samples
+        &self.summary().samples
     }
 
     pub(crate) fn level_prior(&self) -> &[LevelPrior] {
-        &self.level_prior
+        &self.summary().level_prior
     }
 
     /// Density of contacts with something else \[1/m³\]: uniform in a ball of the largest model's
@@ -284,6 +312,6 @@ impl ObjectLibrary {
 
     /// Extent of the largest model \[m\].
     pub(crate) fn extent_m(&self) -> f64 {
-        self.extent_m
+        self.summary().extent_m
     }
 }

@@ -1,6 +1,10 @@
 //! Inner loops in the widest vectors of the machine.
 
+mod functions;
+
 use pulp::{Arch, Simd, WithSimd};
+
+pub use functions::{exp, ln, sin_cos};
 
 /// Work that is compiled once for each instruction set.
 struct Work<F>(F);

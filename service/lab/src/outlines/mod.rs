@@ -16,5 +16,5 @@ mod solid;
 pub use family::{Family, Levels};
 pub use protocol::{InvalidOutlineProtocol, OutlineProtocol, Teaching, Turn};
 pub use report::{Answers, Report, Row};
-pub use run::run;
+pub use run::{drawn_lesson, run};
 pub use solid::{Felt, Solid};

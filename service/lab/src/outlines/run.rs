@@ -135,32 +135,52 @@ fn teach(
     let mut events = Vec::new();
     let name = Label::new("hand")?;
     map.apply(&Record::Enrol { agent: HAND, name }, &mut events);
-    let noise = noise(protocol)?;
     for (solid, number) in solids.iter().zip(0..) {
-        let way = match protocol.teaching {
-            Teaching::Everywhere => lesson(solid, protocol.taught, random),
-            Teaching::Run => walk(solid, protocol.taught, protocol.step_m, random),
-        };
-        let touches = way.into_iter().map(|felt| {
-            let felt = noisy(protocol, &felt, random);
-            let level = TouchLevel::new(Label::new(CHANNEL)?, felt.level, protocol.level_sd)?;
-            let touch = Touch::new(felt.position_m.into(), noise)?.with_levels(vec![level]);
-            if protocol.normals {
-                touch.with_normal(felt.normal.into_inner().into())
-            } else {
-                Ok(touch)
-            }
-        });
-        let lesson = Lesson::new(Spacing::default(), touches.collect::<Result<_, _>>()?);
-        let name = Label::new(&format!("solid-{number}"))?;
         let record = Record::TeachObject {
             number,
-            name,
-            lesson,
+            name: Label::new(&format!("solid-{number}"))?,
+            lesson: lesson_of(protocol, solid, random)?,
         };
         map.apply(&record, &mut events);
     }
     Ok(map)
+}
+
+/// A lesson of a solid that is drawn from the protocol's family.
+///
+/// # Errors
+/// A number of the protocol is none that a sample may have.
+pub fn drawn_lesson(
+    protocol: &OutlineProtocol,
+    random: &mut ChaCha8Rng,
+) -> Result<Lesson, InvalidSample> {
+    let solid = protocol.family.draw(protocol.levels, random);
+    lesson_of(protocol, &solid, random)
+}
+
+/// The contacts by which a solid is taught.
+fn lesson_of(
+    protocol: &OutlineProtocol,
+    solid: &Solid,
+    random: &mut ChaCha8Rng,
+) -> Result<Lesson, InvalidSample> {
+    let noise = noise(protocol)?;
+    let way = match protocol.teaching {
+        Teaching::Everywhere => lesson(solid, protocol.taught, random),
+        Teaching::Run => walk(solid, protocol.taught, protocol.step_m, random),
+    };
+    let touches = way.into_iter().map(|felt| {
+        let felt = noisy(protocol, &felt, random);
+        let level = TouchLevel::new(Label::new(CHANNEL)?, felt.level, protocol.level_sd)?;
+        let touch = Touch::new(felt.position_m.into(), noise)?.with_levels(vec![level]);
+        if protocol.normals {
+            touch.with_normal(felt.normal.into_inner().into())
+        } else {
+            Ok(touch)
+        }
+    });
+    let touches = touches.collect::<Result<_, _>>()?;
+    Ok(Lesson::new(Spacing::default(), touches))
 }
 
 /// How an object has turned, and what the recogniser is told of it.

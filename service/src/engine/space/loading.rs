@@ -9,9 +9,9 @@ use cognitive_map::Settings;
 use crate::engine::checkpointer::Checkpointer;
 use crate::engine::queue::Inbox;
 use crate::engine::recovery::{self, Loading, RecoveryError};
-use crate::engine::relaxers::Handover;
 use crate::engine::shared::{Shared, Surroundings};
 use crate::engine::unavailable::Unavailable;
+use crate::engine::workers::Handover;
 use crate::engine::writer::Writer;
 
 /// Stands for the writer's thread: when it ends, also by a panic, nobody waits for it any more.
@@ -40,7 +40,7 @@ pub(super) fn load_and_run(
         health,
         commits,
         jobs,
-        relaxers,
+        workers,
         settings,
         ..
     } = around;
@@ -70,7 +70,7 @@ pub(super) fn load_and_run(
                 .revision
                 .store(recovered.map.revision(), Ordering::Release);
             shared.events.begin(recovered.events.clone());
-            let handover = Handover::new(relaxers);
+            let handover = Handover::new(workers);
             let writer = Writer::new(
                 Arc::clone(shared),
                 commits,

@@ -32,10 +32,10 @@ use super::episodes::EndedEpisodes;
 use super::message::{Call, Change};
 use super::queue::{Inbox, Message};
 use super::recovery::Recovered;
-use super::relaxers::Handover;
 use super::sequencer::{Sequencer, Window};
 use super::shared::Shared;
 use super::trajectory;
+use super::workers::Handover;
 use crate::encode::{self, LatestEpisode};
 use crate::journal::BlockWriter;
 use crate::store::ChunkKey;
@@ -151,6 +151,7 @@ impl Writer {
             applied: 0,
         };
         writer.restore_agents(recorders, episodes);
+        writer.handover.offer(&writer.map);
         writer
     }
 
@@ -168,6 +169,7 @@ impl Writer {
             if now >= next_look {
                 self.give_up_gaps(now);
                 self.measure(waiting);
+                self.handover.offer(&self.map);
                 next_look = now + PATIENCE;
             }
             self.shared.serve_snapshots(&self.map);

@@ -69,8 +69,9 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// of odometry from false sightings, too, and forgot landmarks that were refused in a row, version
 /// 38 did not know where robots saw landmarks lately, version 39 not what ties archived
 /// landmarks to others, version 40 predicted objects of few contacts from their neighbours alone,
-/// version 41 took them for bodies or lists of places, but not for either.
-const VERSION: u16 = 42;
+/// version 41 took them for bodies or lists of places, but not for either. Version 42 added up
+/// mean views by the numbers of their cells.
+const VERSION: u16 = 43;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

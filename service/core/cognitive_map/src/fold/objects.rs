@@ -6,7 +6,9 @@ use crate::event::EventKind;
 use crate::input::AgentId;
 use crate::input::Label;
 use crate::input::{ObjectMark, Spacing, Touch};
-use crate::memory::object::{Episode, Identified, Insight, KnownObject, News, ObjectMemory};
+use crate::memory::object::{
+    Episode, Identified, IndexingJob, Insight, KnownObject, News, ObjectMemory,
+};
 use object_recognition::{Contact, Density, ModelPlace, ObjectId, ObjectModel, Orientation};
 
 impl Fold<'_> {
@@ -119,6 +121,12 @@ impl CognitiveMap {
     /// Lessons and wishes to forget so far: the number of the next one.
     pub fn lessons(&self) -> u64 {
         self.objects.lessons()
+    }
+
+    /// What is to be computed before objects are recognised that were learned or restored. None
+    /// without objects, and if they have not changed after a revision.
+    pub fn indexing(&self, after: Option<u64>) -> Option<IndexingJob> {
+        self.objects.indexing(after)
     }
 
     /// Number of objects.

@@ -10,9 +10,9 @@ use super::superellipsoid::{PARAMETERS, Superellipsoid};
 use super::tails;
 use super::taken::Taken;
 use super::tuning::{
-    BODY_FOLD_STEPS, BODY_FOLDS, BODY_MISSED_SDS, BODY_PROBABILITY_MIN, CHOSEN_RATIO_SD, CORE_MAX,
-    REGULARITY_MAX, REGULARITY_SD, SIDE_NORMAL_COS, SIDE_PROBABILITY_MIN, SIDE_SAMPLES,
-    SIDE_SAMPLES_APART, UNEXPECTED_SHARE,
+    BODY_FOLD_STEPS, BODY_FOLDS, BODY_MISSED_SDS, BODY_PLACES, BODY_PROBABILITY_MIN,
+    CHOSEN_RATIO_SD, CORE_MAX, REGULARITY_MAX, REGULARITY_SD, SIDE_NORMAL_COS,
+    SIDE_PROBABILITY_MIN, SIDE_SAMPLES, SIDE_SAMPLES_APART, UNEXPECTED_SHARE,
 };
 use crate::model::ModelPlace;
 
@@ -75,10 +75,12 @@ impl Body {
             .iter()
             .map(|place| place.variance_m2 / (place.count * place.count));
         let noise_m2 = noise.sum::<f64>() / places.len().max(1) as f64;
-        let fit = BodyFit::new(&positions, noise_m2);
-        if fit.is_flat() {
+        let all = BodyFit::new(&positions, noise_m2);
+        if all.is_flat() {
             return None;
         }
+        let some = evenly_chosen(&positions, BODY_PLACES);
+        let fit = all.of(&some);
         let found = fit.found();
         let best = found.first()?;
         let errors = left_out(&fit, &found)?;
@@ -86,7 +88,7 @@ impl Body {
         let covariance = fit.information(best).0.cholesky()?.inverse();
         let surface_m2 = f64::max(errors.variance_m2 - noise_m2, 0.0);
         // The rule of succession (Laplace 1774).
-        let missed = (errors.missed as f64 + 1.0) / (places.len() as f64 + 2.0);
+        let missed = (errors.missed as f64 + 1.0) / (some.len() as f64 + 2.0);
         let masses: Vec<f64> = found
             .iter()
             .map(|own| (best.cost - own.cost).exp())
@@ -123,7 +125,10 @@ impl Body {
     /// bodies would have so few of as many places at random (Poisson 1837). On the far side of what
     /// was felt from above are those about its edge alone.
     pub(super) fn is_felt_all_over(&self, places: &[ModelPlace]) -> bool {
-        let mut taken = Taken::new(SIDE_SAMPLES_APART * self.form.half_m.mean());
+        let mut taken = Taken::new(
+            SIDE_SAMPLES_APART * self.form.half_m.mean(),
+            SIDE_SAMPLES as usize / 8,
+        );
         let points = self.points(SIDE_SAMPLES).filter(|at| {
             let is_free = !taken.holds(at);
             if is_free {
@@ -160,6 +165,17 @@ impl Body {
                 .point(&Vector3::new(across * cos, across * sin, z))
         })
     }
+}
+
+/// About so many of some points, or all of them, chosen evenly but with no period: two fingers may
+/// have felt them in turns.
+fn evenly_chosen(points: &[Point3<f64>], count: usize) -> Vec<Point3<f64>> {
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let share = count as f64 / points.len().max(1) as f64;
+    let numbered = points.iter().enumerate();
+    // Fractions of the multiples of the golden ratio are spread evenly (Weyl 1916).
+    let chosen = numbered.filter(|(number, _)| (*number as f64 * GOLDEN).fract() < share);
+    chosen.map(|(_, point)| *point).collect()
 }
 
 /// By how many deviations points of a body lie farther from their nearest ones than points that are

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_4, TAU};
 
 use nalgebra::{Matrix3, Point3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
 
-use super::superellipsoid::{PARAMETERS, Superellipsoid};
+use super::superellipsoid::{Distance, PARAMETERS, Superellipsoid};
 use super::tails;
 use super::tuning::{
     BODY_FIRST_STEPS, BODY_KEPT, BODY_LAST_STEPS, BODY_SAMPLES, BODY_STEP_MAX, EXPONENT_LOG,
@@ -37,6 +37,8 @@ pub(super) struct Candidate {
     pub(super) variance_m2: f64,
     /// Its negative log-likelihood times its prior.
     pub(super) cost: f64,
+    /// It about each of the places.
+    distances: Vec<Distance>,
 }
 
 impl<'a> BodyFit<'a> {
@@ -170,8 +172,9 @@ impl<'a> BodyFit<'a> {
     }
 
     fn candidate(&self, form: Superellipsoid) -> Candidate {
-        let off_m = self.places.iter().map(|at| form.distance(at).off_m);
-        let errors: Vec<(f64, f64, f64)> = off_m.map(|off_m| (off_m * off_m, 1.0, 1.0)).collect();
+        let distances: Vec<Distance> = self.places.iter().map(|at| form.distance(at)).collect();
+        let squares = distances.iter().map(|own| own.off_m * own.off_m);
+        let errors: Vec<(f64, f64, f64)> = squares.map(|square| (square, 1.0, 1.0)).collect();
         let (log, variance_m2) = tails::profile(&errors, self.least_m2);
         let count = self.places.len() as f64;
         let squares = self
@@ -182,6 +185,7 @@ impl<'a> BodyFit<'a> {
             form,
             variance_m2,
             cost,
+            distances,
         }
     }
 
@@ -203,11 +207,10 @@ impl<'a> BodyFit<'a> {
     pub(super) fn information(&self, own: &Candidate) -> (Information, Parameters) {
         let mut information = Information::zeros();
         let mut gradient = Parameters::zeros();
-        for at in self.places {
-            let distance = own.form.distance(at);
+        for distance in &own.distances {
             let square = distance.off_m * distance.off_m;
             let weight = tails::weight(square / own.variance_m2) / own.variance_m2;
-            information.ger(weight, &distance.slopes, &distance.slopes, 1.0);
+            information.syger(weight, &distance.slopes, &distance.slopes, 1.0);
             gradient += distance.slopes * (weight * distance.off_m);
         }
         let count = self.places.len() as f64;
@@ -225,6 +228,7 @@ impl<'a> BodyFit<'a> {
             information[(axis, axis)] += self.size_m.powi(-2);
             information[(3 + axis, 3 + axis)] += 1.0;
         }
+        information.fill_upper_triangle_with_lower_triangle();
         (information, gradient)
     }
 }

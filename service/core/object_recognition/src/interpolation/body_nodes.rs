@@ -24,22 +24,24 @@ pub(super) fn on_body(
 ) -> Vec<IndexedPlace> {
     let room = NODES_MAX.saturating_sub(places.len());
     let reach_m = EXPLORED_REACH * graph.typical_m;
-    let is_near = |at: &Point3<f64>| {
-        let mut apart = places.iter().map(|place| place.position_m - at);
-        apart.any(|apart| apart.norm_squared() < reach_m * reach_m)
-    };
-    let points: Vec<Point3<f64>> = body.points(BODY_POINTS).filter(is_near).collect();
+    let mut explored = Taken::new(reach_m, places.len());
+    for place in places {
+        explored.add(place.position_m);
+    }
+    let points = body.points(BODY_POINTS);
+    let points: Vec<Point3<f64>> = points.filter(|at| explored.holds(at)).collect();
     // Finer steps than these never fit, or say no more.
     let finest_m = f64::max(
         graph.longest_m / NODES_MAX as f64,
         body.typical_error_m / NODE_ERROR,
     );
     let mut step_m = f64::max(NODE_STEP * spacing_m, finest_m);
-    let mut chosen = spread(&points, places, step_m);
-    while chosen.len() > room {
+    let chosen = loop {
+        if let Some(chosen) = spread(&points, places, step_m, room) {
+            break chosen;
+        }
         step_m *= NODES_GROWTH;
-        chosen = spread(&points, places, step_m);
-    }
+    };
     let field_m = NODE_FIELD * step_m;
     let node = |at: Point3<f64>| {
         let (error_m2, normal) = body.surface(&at);
@@ -82,18 +84,27 @@ pub(super) fn on_body(
     chosen.into_iter().filter_map(node).collect()
 }
 
-/// Those of some points that lie about a step from one another and from the places.
-fn spread(points: &[Point3<f64>], places: &[ModelPlace], step_m: f64) -> Vec<Point3<f64>> {
-    let mut taken = Taken::new(BODY_APART * step_m);
+/// Those of some points that lie about a step from one another and from the places; `None` if they
+/// are more than there is room for.
+fn spread(
+    points: &[Point3<f64>],
+    places: &[ModelPlace],
+    step_m: f64,
+    room: usize,
+) -> Option<Vec<Point3<f64>>> {
+    let mut taken = Taken::new(BODY_APART * step_m, places.len() + room);
     for place in places {
         taken.add(place.position_m);
     }
     let mut chosen = Vec::new();
     for at in points {
         if !taken.holds(at) {
+            if chosen.len() == room {
+                return None;
+            }
             taken.add(*at);
             chosen.push(*at);
         }
     }
-    chosen
+    Some(chosen)
 }

@@ -114,7 +114,7 @@ fn sites(places: &[ModelPlace], graph: &LinkGraph, sides: &Sides) -> Vec<(Site, 
 /// Points of all sites, no two nearer than about a step.
 fn spans(places: &[ModelPlace], sites: &[(Site, Vec<u32>)], step_m: f64) -> Vec<Span> {
     let mut spans: Vec<Span> = Vec::new();
-    let mut taken = Taken::new(NODE_APART * step_m);
+    let mut taken = Taken::new(NODE_APART * step_m, places.len() + NODES_MAX);
     for place in places {
         taken.add(place.position_m);
     }

@@ -55,24 +55,38 @@ const ELLIPSOID_AREA: f64 = 4.0 * std::f64::consts::PI / 3.0;
 const ROUND_TO_FLAT: [f64; 2] = [0.273_24, 0.5];
 
 /// The norm (|a|ᵖ + |b|ᵖ)^(1/p), its slopes by both, and by ln p.
+///
+/// Of the smaller per the larger, r, it needs t = rᵖ and s = (1 + t)^(1/p − 1) alone: per the
+/// larger the norm is (1 + t) s, and the slopes are s and s t/r.
 fn norm([a, b]: [f64; 2], p: f64) -> (f64, [f64; 2], f64) {
-    let largest = f64::max(a.abs(), b.abs());
-    if largest < f64::MIN_POSITIVE {
+    let [a_size, b_size] = [a.abs(), b.abs()];
+    let is_a_larger = a_size >= b_size;
+    let (larger, smaller) = if is_a_larger {
+        (a_size, b_size)
+    } else {
+        (b_size, a_size)
+    };
+    if larger < f64::MIN_POSITIVE {
         return (0.0, [0.0; 2], 0.0);
     }
-    let powers = [a, b].map(|own| (own.abs() / largest).powf(p));
-    let sum = powers[0] + powers[1];
-    let norm = largest * sum.powf(1.0 / p);
-    let slope = |own: f64| (own.abs() / norm).powf(p - 1.0) * own.signum();
-    let entropy = |own: f64, power: f64| {
-        if power > 0.0 {
-            power / sum * (own.abs() / norm).ln()
-        } else {
-            0.0
-        }
+    let ratio = smaller / larger;
+    if ratio < f64::MIN_POSITIVE {
+        let [by_a, by_b] = if is_a_larger { [1.0, 0.0] } else { [0.0, 1.0] };
+        return (larger, [by_a * a.signum(), by_b * b.signum()], 0.0);
+    }
+    let ratio_log = ratio.ln();
+    let power = (p * ratio_log).exp();
+    let sum_log = power.ln_1p();
+    let steep = (sum_log * (1.0 / p - 1.0)).exp();
+    let norm = larger * (1.0 + power) * steep;
+    let flat = steep * power / ratio;
+    let by_exponent = norm * (power / (1.0 + power) * ratio_log - sum_log / p);
+    let [by_a, by_b] = if is_a_larger {
+        [steep, flat]
+    } else {
+        [flat, steep]
     };
-    let by_exponent = norm * (entropy(a, powers[0]) + entropy(b, powers[1]));
-    (norm, [slope(a), slope(b)], by_exponent)
+    (norm, [by_a * a.signum(), by_b * b.signum()], by_exponent)
 }
 
 impl Superellipsoid {

@@ -92,6 +92,8 @@ pub(super) const CORE_MAX: f64 = 0.5;
 /// Deviation of the mean distance of chosen places to their nearest ones, per that of random ones.
 /// Chosen: the ratio is 2 of a square pattern, and nearly 0 of pairs.
 pub(super) const CHOSEN_RATIO_SD: f64 = 0.5;
+/// Places to which a body is fitted, evenly chosen of more. Budget.
+pub(super) const BODY_PLACES: usize = 256;
 /// Places by which the first steps to a body are made. Budget.
 pub(super) const BODY_SAMPLES: usize = 128;
 /// First steps from each start. Budget.

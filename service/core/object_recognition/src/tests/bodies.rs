@@ -168,6 +168,27 @@ fn a_body_is_the_same_in_any_frame() {
 }
 
 /// What was felt from above is not closed below: no flat end is made up inside.
+/// Of many contacts a body is fitted to some.
+#[test]
+fn two_fingers_that_touch_in_turns_tell_a_body() {
+    let points = || (0..1000).map(|key| on_box(SIDES_M, key).0);
+    let left = points().filter(|point| point.x < 0.0);
+    let right = points().filter(|point| point.x >= 0.0);
+    let in_turns = left.zip(right).flat_map(|(left, right)| [left, right]);
+    let settings = ModelSettings {
+        spacing_m: 0.0005,
+        ..ModelSettings::default()
+    };
+    let mut model = ObjectModel::new(settings);
+    for (key, point) in (0..320).zip(in_turns) {
+        let felt = touch((point, Vector3::z_axis()), &Isometry3::identity(), key);
+        model.learn(&Contact::at(felt.position_m, NOISE_M));
+    }
+    assert!(model.places().len() > 256, "{}", model.places().len());
+    let (places, _) = IndexedModel::variants(&model);
+    assert!(places.shares_errors() && !places.is_vague());
+}
+
 #[test]
 fn what_stands_on_a_table_is_not_supposed_to_end_where_it_was_not_felt() {
     let cap = (0..9000).map(|key| on_ball(RADIUS_M, key).0);

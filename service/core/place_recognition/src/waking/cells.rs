@@ -3,7 +3,8 @@
 use nalgebra::{Point3, Vector3};
 use state::{Counted, PagedVec, state_of_struct};
 
-use super::index::{CellIndex, Key};
+use super::index::Key;
+use super::tiles::{BESIDE, KERNEL, Tiles};
 use crate::descriptor::{dot, dot_inline};
 use crate::tuning::cells as tuning;
 
@@ -41,18 +42,8 @@ state_of_struct!(Cell {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Cells {
     pub(crate) all: PagedVec<Cell, 16>,
-    /// The cells with views about each, and their weights by the kernel; derived.
-    near: PagedVec<Vec<(u32, f32)>, 64>,
-    /// The cells by channel and key; derived.
-    index: CellIndex,
-}
-
-/// Tells the channel and key of a numbered cell.
-fn place_in(cells: &PagedVec<Cell, 16>) -> impl Fn(u32) -> Option<(u8, Key)> + '_ {
-    move |number| {
-        let cell = cells.get(number as usize)?;
-        Some((cell.channel, cell.key))
-    }
+    /// Where they are; derived.
+    tiles: Tiles,
 }
 
 /// How alike a view is to what was seen about a cell.
@@ -86,8 +77,7 @@ impl Cells {
         let Some(cell) = self.all.get_mut(own as usize, revision) else {
             return;
         };
-        let is_first = cell.sum.is_empty();
-        if is_first {
+        if cell.sum.is_empty() {
             cell.sum = vec![0.0; vector.len()].into();
         }
         for (sum, number) in cell.sum.iter_mut().zip(vector) {
@@ -96,38 +86,42 @@ impl Cells {
         cell.weight += weight;
         cell.height_m += (height_m - cell.height_m) * weight / cell.weight;
         cell.length = dot(&cell.sum, &cell.sum).sqrt();
-        if is_first {
-            for (about, kernel) in self.about(channel, key) {
-                if let Some(near) = self.near.get_mut(about as usize, revision) {
-                    let at = near.partition_point(|(number, _)| *number < own);
-                    near.insert(at, (own, kernel));
-                }
-            }
-        }
     }
 
     /// Takes a view of a cell into the sums about its neighbours.
     fn grow_about(&mut self, own: u32, vector: &[f32], weight: f32, revision: u64) {
+        /// Cells that count for a neighbour, from that of the view, along each side.
+        const REACH: i32 = 2 * tuning::REACH;
+        const WIDTH: usize = 2 * REACH as usize + 1;
         let Some(cell) = self.all.get(own as usize) else {
             return;
         };
-        let about = self.about(cell.channel, cell.key);
-        let mut dots: Vec<(u32, f32)> = Vec::new();
-        for (other, kernel) in about {
-            let near = self.near.get(other as usize);
-            let mut along = 0.0;
-            for &(number, share) in near.into_iter().flatten() {
-                let known = dots.iter().find(|(known, _)| *known == number).copied();
-                let (_, product) = known.unwrap_or_else(|| {
-                    let sum = self.all.get(number as usize).map(|cell| &*cell.sum);
-                    let sum = sum.filter(|sum| !sum.is_empty());
-                    let product = (number, sum.map_or(0.0, |sum| dot(sum, vector)));
-                    dots.push(product);
-                    product
-                });
-                along += share * product;
+        let (channel, [x, y, z]) = (cell.channel, cell.key);
+        let at =
+            |[by_x, by_y]: [i32; 2]| [by_x, by_y].map(|by| (by + REACH).unsigned_abs() as usize);
+        let mut products = [[0.0; WIDTH]; WIDTH];
+        for offset in (-REACH..=REACH).flat_map(|i| (-REACH..=REACH).map(move |j| [i, j])) {
+            let [i, j] = offset;
+            if i * i + j * j > REACH * REACH {
+                continue;
             }
-            let step = weight * kernel;
+            let number = self.find(channel, [x + i, y + j, z]);
+            let cell = number.and_then(|number| self.get(number));
+            if let Some(cell) = cell.filter(|cell| cell.sum.len() == vector.len()) {
+                let [row, column] = at(offset);
+                products[row][column] = dot(&cell.sum, vector);
+            }
+        }
+        for ([i, j], share) in KERNEL.iter() {
+            let Some(other) = self.find(channel, [x + i, y + j, z]) else {
+                continue;
+            };
+            let near = KERNEL.iter().map(|([k, l], share)| {
+                let [row, column] = at([i + k, j + l]);
+                share * products[row][column]
+            });
+            let along: f32 = near.sum();
+            let step = weight * share;
             if let Some(cell) = self.all.get_mut(other as usize, revision) {
                 // |m + s u|² = |m|² + 2 s m·u + s², of a unit vector u.
                 cell.about_squared += step * (2.0 * along + step);
@@ -145,19 +139,18 @@ impl Cells {
             return None;
         }
         let number = u32::try_from(self.all.len()).ok()?;
-        let near = self.near_of(channel, key);
-        let first = near
-            .first()
-            .and_then(|(first, _)| self.all.get(*first as usize));
-        let mut mean = vec![0.0; first.map_or(0, |cell| cell.sum.len())];
+        let mut mean = Vec::new();
         let mut about_weight = 0.0;
-        for (other, kernel) in &near {
-            let Some(cell) = self.all.get(*other as usize) else {
+        for ([x, y], share) in KERNEL.iter() {
+            let other = self.find(channel, [key[0] + x, key[1] + y, key[2]]);
+            let other = other.and_then(|other| self.get(other));
+            let Some(cell) = other.filter(|cell| !cell.sum.is_empty()) else {
                 continue;
             };
-            about_weight += kernel * cell.weight;
+            about_weight += share * cell.weight;
+            mean.resize(cell.sum.len(), 0.0);
             for (mean, number) in mean.iter_mut().zip(&cell.sum) {
-                *mean += kernel * number;
+                *mean += share * number;
             }
         }
         self.all.push(
@@ -173,72 +166,72 @@ impl Cells {
             },
             revision,
         );
-        self.near.push(near, revision);
-        self.index.insert(number, channel, key, place_in(&self.all));
+        self.tiles.insert(number, channel, key, revision);
         Some(number)
     }
 
     /// The number of the cell of a channel at a key.
     pub(super) fn find(&self, channel: u8, key: Key) -> Option<u32> {
-        self.index.find(channel, key, place_in(&self.all))
+        self.tiles.find(channel, key)
     }
 
     pub(super) fn get(&self, number: u32) -> Option<&Cell> {
         self.all.get(number as usize)
     }
 
-    /// The cells about a key, with their weights by the kernel.
-    fn about(&self, channel: u8, key: Key) -> Vec<(u32, f32)> {
-        let reach = tuning::REACH;
-        let offsets = (-reach..=reach).flat_map(|x| (-reach..=reach).map(move |y| (x, y)));
-        let found = offsets.filter_map(|(x, y)| {
-            let kernel = kernel(x * x + y * y)?;
-            let number = self.find(channel, [key[0] + x, key[1] + y, key[2]])?;
-            Some((number, kernel))
-        });
-        found.collect()
-    }
-
-    /// Those of them that have views, by number: sums have one order, whoever derives them.
-    fn near_of(&self, channel: u8, key: Key) -> Vec<(u32, f32)> {
-        let mut about = self.about(channel, key);
-        about.retain(|(number, _)| self.get(*number).is_some_and(|cell| !cell.sum.is_empty()));
-        about.sort_unstable_by_key(|(number, _)| *number);
-        about
-    }
-
     /// How alike a view is to what was seen about each cell of its channel.
     pub(super) fn alike(&self, channel: u8, vector: &[f32]) -> Vec<Alike> {
-        let mut products = vec![[0.0; 2]; self.all.len()];
+        let is_seen = |cell: &Cell| cell.channel == channel && cell.sum.len() == vector.len();
+        let mut values = vec![[0.0; 2]; self.all.len()];
         simd::dispatch(
             #[inline(always)]
             || {
-                for (product, cell) in products.iter_mut().zip(self.all.iter()) {
-                    if cell.channel == channel && cell.sum.len() == vector.len() {
-                        product[0] = dot_inline(&cell.sum, vector);
+                for (value, cell) in values.iter_mut().zip(self.all.iter()) {
+                    if is_seen(cell) {
+                        value[0] = dot_inline(&cell.sum, vector);
                     }
                 }
             },
         );
-        for ([product, density], cell) in products.iter_mut().zip(self.all.iter()) {
-            if cell.channel == channel && cell.sum.len() == vector.len() {
-                let cosine = *product / cell.length.max(f32::MIN_POSITIVE);
-                *density = cell.weight * (tuning::SHARPNESS * (cosine - 1.0)).exp();
+        let seen = self.all.iter().zip(&values).map(|(cell, [product, _])| {
+            let cosine = product / cell.length.max(f32::MIN_POSITIVE);
+            tuning::SHARPNESS * (cosine - 1.0)
+        });
+        let mut densities: Vec<f32> = seen.collect();
+        simd::exp(&mut densities);
+        for ((value, cell), density) in values.iter_mut().zip(self.all.iter()).zip(densities) {
+            if is_seen(cell) {
+                value[1] = cell.weight * density;
             }
         }
-        let pairs = (0_u32..).zip(self.all.iter()).zip(self.near.iter());
-        let own = pairs.filter(|((_, cell), _)| cell.channel == channel);
-        own.map(|((number, cell), near)| {
-            let [product, density] = weighted_sums(near, &products);
-            let length = cell.about_squared.max(f32::MIN_POSITIVE).sqrt();
-            let open = cell.about_weight + tuning::OPEN;
-            let features = [product / length, ((density + tuning::LEAST) / open).ln()];
-            Alike {
-                cell: number,
-                features,
-            }
-        })
-        .collect()
+        let sums = self.tiles.sums(channel, &KERNEL, &values);
+        let cells = || { self.all.iter().zip(&sums) }.filter(|(cell, _)| cell.channel == channel);
+        let shares = cells().map(|(cell, [_, density])| {
+            (density + tuning::LEAST) / (cell.about_weight + tuning::OPEN)
+        });
+        let mut logs: Vec<f32> = shares.collect();
+        simd::ln(&mut logs);
+        let numbered = { (0..).zip(self.all.iter()) }.filter(|(_, cell)| cell.channel == channel);
+        let alike = numbered.zip(cells()).zip(logs);
+        alike
+            .map(|(((number, _), (cell, [product, _])), log)| {
+                let length = cell.about_squared.max(f32::MIN_POSITIVE).sqrt();
+                Alike {
+                    cell: number,
+                    features: [product / length, log],
+                }
+            })
+            .collect()
+    }
+
+    /// The cell of a channel in and beside which most weight is, of weights by cell; `None` where
+    /// there is none.
+    pub(super) fn heaviest(&self, channel: u8, weights: &[[f32; 1]]) -> Option<&Cell> {
+        let sums = self.tiles.sums(channel, &BESIDE, weights);
+        let cells = self.all.iter().zip(sums);
+        let own = cells.filter(|(cell, [sum])| cell.channel == channel && *sum > 0.0);
+        let most = own.max_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
+        most.map(|(cell, _)| cell)
     }
 
     /// Whether a channel has so many cells.
@@ -268,26 +261,16 @@ impl Cells {
 
     /// Rebuilds what is derived.
     pub(super) fn rebuild(&mut self, revision: u64) {
-        self.index = CellIndex::default();
-        self.near = PagedVec::default();
-        for number in 0..self.all.len() {
-            if let (Some(cell), Ok(at)) = (self.all.get(number), u32::try_from(number)) {
-                let (channel, key) = (cell.channel, cell.key);
-                self.index.insert(at, channel, key, place_in(&self.all));
-            }
-        }
-        for number in 0..self.all.len() {
-            let near = self.all.get(number);
-            let near = near.map_or_else(Vec::new, |cell| self.near_of(cell.channel, cell.key));
-            self.near.push(near, revision);
+        self.tiles = Tiles::default();
+        for (number, cell) in (0..).zip(self.all.iter()) {
+            self.tiles.insert(number, cell.channel, cell.key, revision);
         }
     }
 
     /// Bytes of memory that they take.
     pub(super) fn bytes(&self) -> usize {
         let numbers: usize = self.all.iter().map(|cell| cell.sum.len()).sum();
-        let near: usize = self.near.iter().map(Vec::len).sum();
-        self.all.bytes() + self.near.bytes() + 4 * numbers + 8 * near + self.index.bytes()
+        self.all.bytes() + 4 * numbers + self.tiles.bytes()
     }
 }
 
@@ -312,33 +295,8 @@ pub(super) fn key_of(at: &Point3<f64>) -> Key {
 }
 
 /// The keys beside one in its layer.
-pub(super) fn beside(key: Key) -> impl Iterator<Item = Key> {
+fn beside(key: Key) -> impl Iterator<Item = Key> {
     let offsets = (-1..=1).flat_map(|x| (-1..=1).map(move |y| (x, y)));
     let offsets = offsets.filter(|offset| *offset != (0, 0));
     offsets.map(move |(x, y)| [key[0] + x, key[1] + y, key[2]])
-}
-
-/// Sums over the cells about one, weighted by the kernel: four side by side, since each sum has an
-/// order of additions that it has to keep.
-fn weighted_sums(near: &[(u32, f32)], all: &[[f32; 2]]) -> [f32; 2] {
-    let mut sums = [[0.0; 2]; 4];
-    let (fours, rest) = near.as_chunks::<4>();
-    for near in fours.iter().map(|four| &four[..]).chain([rest]) {
-        for (sum, &(number, kernel)) in sums.iter_mut().zip(near) {
-            let own = &all[number as usize];
-            sum[0] += kernel * own[0];
-            sum[1] += kernel * own[1];
-        }
-    }
-    let [a, b, c, d] = sums;
-    [0, 1].map(|k| (a[k] + b[k]) + (c[k] + d[k]))
-}
-
-/// Weight of a cell so many squared sides away; `None` beyond the reach.
-fn kernel(squared: i32) -> Option<f32> {
-    let reach = tuning::REACH;
-    #[expect(clippy::cast_possible_truncation, reason = "1 at most")]
-    let weight =
-        (-0.5 * f64::from(squared) * (tuning::SIDE_M / tuning::KERNEL_M).powi(2)).exp() as f32;
-    (squared <= reach * reach).then_some(weight)
 }

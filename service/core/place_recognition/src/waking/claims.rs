@@ -5,7 +5,8 @@ use nalgebra::{Isometry3, Matrix6};
 use state::state_of_struct;
 
 use super::logistic::Logistic;
-use super::particles::{Filter, Mode};
+use super::mode::Mode;
+use super::particles::Filter;
 use crate::tuning::claims as tuning;
 
 /// What was learned of claims on a channel.

@@ -1,8 +1,8 @@
-//! Cells by channel and key: open addressing, rebuilt when it is half full.
+//! Numbers by channel and key: open addressing, rebuilt when it is half full.
 
 use std::sync::Arc;
 
-/// Place of a cell in the lattice.
+/// Place of a cell, or of a tile of cells, in its lattice.
 pub(super) type Key = [i32; 3];
 
 /// An empty slot.
@@ -10,15 +10,15 @@ const NONE: u32 = u32::MAX;
 /// Slots of the smallest index.
 const SLOTS_MIN: usize = 64;
 
-/// Numbers of cells by channel and key.
+/// Numbers by channel and key.
 #[derive(Clone, Debug, Default)]
-pub(super) struct CellIndex {
+pub(super) struct KeyIndex {
     slots: Arc<Vec<u32>>,
     len: usize,
 }
 
-impl CellIndex {
-    /// The number of the cell of a channel at a key; `place` tells both of a numbered cell.
+impl KeyIndex {
+    /// The number of what is on a channel at a key; `place` tells both of a number.
     pub(super) fn find(
         &self,
         channel: u8,
@@ -36,7 +36,7 @@ impl CellIndex {
         }
     }
 
-    /// Inserts a cell of which `place` tells, but which is not here.
+    /// Inserts a number of which `place` tells, but which is not here.
     pub(super) fn insert(
         &mut self,
         number: u32,

@@ -4,9 +4,11 @@ mod cells;
 mod claims;
 mod index;
 mod logistic;
+mod mode;
 mod model;
 mod particle;
 mod particles;
+mod tiles;
 
 use geometry::PoseCovariance;
 use nalgebra::Isometry3;
@@ -23,8 +25,9 @@ use crate::view::{SensedTurn, View};
 use crate::views::ShortText;
 use cells::{Alike, Cells, key_of};
 use claims::Claims;
+use mode::Mode;
 use model::CellModel;
-use particles::{Filter, Mode, Moved};
+use particles::{Filter, Moved};
 
 /// A channel of views.
 #[derive(Clone, Debug)]

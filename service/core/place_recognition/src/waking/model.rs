@@ -33,6 +33,15 @@ state_of_struct!(CellModel {
     share_within
 });
 
+/// A softmax over cells.
+struct Softmax {
+    logits: Vec<f64>,
+    /// Logarithm of the sum of their exponentials.
+    whole: f64,
+    /// Probability of each.
+    shares: Vec<f32>,
+}
+
 /// Log likelihoods of a view.
 #[derive(Clone, Debug)]
 pub(super) struct Scores {
@@ -61,7 +70,7 @@ impl CellModel {
         self.n_views >= tuning::VIEWS_MIN && self.told >= tuning::TOLD_MIN
     }
 
-    fn logits(&self, alike: &[Alike]) -> (Vec<f64>, f64) {
+    fn softmax(&self, alike: &[Alike]) -> Softmax {
         let logits: Vec<f64> = { alike.iter() }
             .map(|alike| {
                 let [mean, density] = alike.features.map(f64::from);
@@ -69,13 +78,26 @@ impl CellModel {
             })
             .collect();
         let most = logits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let sum: f64 = logits.iter().map(|logit| (logit - most).exp()).sum();
-        (logits, most + sum.ln())
+        #[expect(clippy::cast_possible_truncation, reason = "at most 0")]
+        let less = logits.iter().map(|logit| (logit - most) as f32);
+        let mut shares: Vec<f32> = less.collect();
+        simd::exp(&mut shares);
+        let sum: f64 = shares.iter().copied().map(f64::from).sum();
+        #[expect(clippy::cast_possible_truncation, reason = "1 at least")]
+        let factor = (1.0 / sum) as f32;
+        for share in &mut shares {
+            *share *= factor;
+        }
+        Softmax {
+            logits,
+            whole: most + sum.ln(),
+            shares,
+        }
     }
 
     /// What a view says.
     pub(super) fn scores(&self, alike: &[Alike]) -> Scores {
-        let (logits, whole) = self.logits(alike);
+        let Softmax { logits, whole, .. } = self.softmax(alike);
         let mean = whole - (alike.len() as f64).ln();
         #[expect(clippy::cast_possible_truncation, reason = "a few nats")]
         let cells = { alike.iter().zip(&logits) }
@@ -100,8 +122,8 @@ impl CellModel {
         if alike.len() < tuning::CELLS_MIN {
             return;
         }
-        let (logits, whole) = self.logits(alike);
-        let mean = whole - (alike.len() as f64).ln();
+        let own = self.softmax(alike);
+        let mean = own.whole - (alike.len() as f64).ln();
         let is_within = cell.is_some();
         self.share_within +=
             (f64::from(u8::from(is_within)) - self.share_within) * (1.0 - tuning::KEPT);
@@ -118,13 +140,13 @@ impl CellModel {
             return;
         };
         let (mut first, mut second) = (SVector::<f64, 2>::zeros(), SMatrix::<f64, 2, 2>::zeros());
-        for (alike, logit) in alike.iter().zip(&logits) {
-            let probability = (logit - whole).exp();
+        for (alike, share) in alike.iter().zip(&own.shares) {
+            let probability = f64::from(*share);
             let features = SVector::from(alike.features.map(f64::from));
             first += features * probability;
             second += features * features.transpose() * probability;
         }
-        let probability = (logits[at] - whole).exp();
+        let probability = (own.logits[at] - own.whole).exp();
         let noise = tuning::MISPLACED / alike.len() as f64;
         let known = (1.0 - tuning::MISPLACED) * probability;
         let share = known / (known + noise);

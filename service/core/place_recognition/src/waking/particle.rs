@@ -55,19 +55,31 @@ impl Particle {
     }
 }
 
-/// Draws particles by the scores of a view. Their weights make up for a tempering that is not the
-/// filter's.
+/// Exponentials of the scores of a view, tempered: how likely it is in each cell.
+pub(super) fn gains(temper: f64, scores: &Scores) -> Vec<f32> {
+    #[expect(clippy::cast_possible_truncation, reason = "a share")]
+    let temper = temper as f32;
+    let mut gains: Vec<f32> = { scores.cells.iter() }
+        .map(|(_, score)| temper * score)
+        .collect();
+    simd::exp(&mut gains);
+    gains
+}
+
+/// Draws particles by these gains of the cells. Their weights make up for a tempering that is not
+/// the filter's.
 pub(super) fn draw(
     count: usize,
-    (temper, turn): (f64, Option<SensedTurn>),
+    (temper, gains): (f64, &[f32]),
+    turn: Option<SensedTurn>,
     scores: &Scores,
     cells: &Cells,
     draws: &mut Seeded,
 ) -> Vec<Particle> {
     let mut sum = 0.0;
-    let sums: Vec<f64> = { scores.cells.iter() }
-        .map(|(_, score)| {
-            sum += (temper * f64::from(*score)).exp();
+    let sums: Vec<f64> = { gains.iter() }
+        .map(|gain| {
+            sum += f64::from(*gain);
             sum
         })
         .collect();

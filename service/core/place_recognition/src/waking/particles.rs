@@ -2,15 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use geometry::PoseCovariance;
-use nalgebra::{Isometry3, Matrix4, Matrix6x4, UnitQuaternion, Vector3};
+use nalgebra::Isometry3;
 use random::Seeded;
 use state::{Counted, state_of_struct};
 
-use super::cells::{Cells, beside};
-use super::index::Key;
+use super::cells::Cells;
 use super::model::Scores;
-use super::particle::{Particle, draw, keys, normalise};
+use super::particle::{Particle, draw, gains, keys, normalise};
 use crate::keyframes::SampleKey;
 use crate::particle_numbers::{floats, pair};
 use crate::tuning::particles as tuning;
@@ -38,7 +36,7 @@ pub(crate) struct Filter {
     n_sure: u8,
     /// Whether it was claimed that the agent is where the filter has it.
     pub(super) has_claimed: bool,
-    particles: Vec<Particle>,
+    pub(super) particles: Vec<Particle>,
 }
 
 state_of_struct!(Filter {
@@ -74,15 +72,6 @@ impl Moved {
     }
 }
 
-/// Where most particles are.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Mode {
-    pub(super) pose: Isometry3<f64>,
-    pub(super) covariance: PoseCovariance,
-    /// Probability that the agent is near.
-    pub(super) probability: f64,
-}
-
 impl Filter {
     pub(super) fn new(sample: SampleKey, channel: u8, is_shadow: bool) -> Self {
         Self {
@@ -110,17 +99,16 @@ impl Filter {
             [self.session.into(), self.channel.into(), 1],
         ));
         let temper = tuning::TEMPER;
-        let weigh = |score: f32| (temper * f64::from(score)).exp();
-        let gains: Vec<f64> = { scores.cells.iter() }
-            .map(|(_, score)| weigh(*score))
-            .collect();
-        let mean_within = gains.iter().sum::<f64>() / gains.len().max(1) as f64;
+        let gains = gains(temper, scores);
+        let all: f64 = gains.iter().copied().map(f64::from).sum();
+        let mean_within = all / gains.len().max(1) as f64;
         let within = scores.within.clamp(tuning::WITHIN.0, tuning::WITHIN.1);
         let numerator = if self.particles.is_empty() {
-            let temper_of_draw = temper.max(tuning::FIRST);
+            let first = temper.max(tuning::FIRST);
             self.particles = draw(
                 tuning::COUNT,
-                (temper_of_draw, *turn),
+                (first, &self::gains(first, scores)),
+                *turn,
                 scores,
                 cells,
                 &mut draws,
@@ -136,7 +124,7 @@ impl Filter {
             let mut of_cell = vec![outside; cells.all.len()];
             for ((cell, _), gain) in scores.cells.iter().zip(&gains) {
                 if !gain.is_nan() {
-                    of_cell[*cell as usize] = *gain;
+                    of_cell[*cell as usize] = f64::from(*gain);
                 }
             }
             let mut old = 0.0;
@@ -162,7 +150,7 @@ impl Filter {
             let all = old + fresh;
             let n_fresh = tuning::COUNT / tuning::FRESH;
             self.resample(tuning::COUNT - n_fresh, old / all, &mut draws);
-            let mut new = draw(n_fresh, (temper, *turn), scores, cells, &mut draws);
+            let mut new = draw(n_fresh, (temper, &gains), *turn, scores, cells, &mut draws);
             normalise(&mut new);
             #[expect(clippy::cast_possible_truncation, reason = "a share")]
             let share = (fresh / all) as f32;
@@ -185,10 +173,12 @@ impl Filter {
         let length_m = way.norm();
         let turn_sd = tuning::TURN_SD.0 + tuning::TURN_SD.1 * length_m.sqrt();
         let position_sd = tuning::POSITION_SD.0 + tuning::POSITION_SD.1 * length_m.sqrt();
-        for particle in &mut self.particles {
+        let (sines, cosines) = simd::sin_cos(self.particles.iter().map(|own| own.turn_rad));
+        let turns = sines.into_iter().zip(cosines);
+        for (particle, (sin, cos)) in self.particles.iter_mut().zip(turns) {
             let [a, b] = pair(draws);
             let [c, d] = pair(draws);
-            let (sin, cos) = f64::from(particle.turn_rad).sin_cos();
+            let [sin, cos] = [sin, cos].map(f64::from);
             let scale = f64::from(particle.scale);
             let [x, y, z] = particle.at.map(f64::from);
             particle.at = floats([
@@ -255,130 +245,6 @@ impl Filter {
             kept.push(last);
         }
         self.particles = kept;
-    }
-
-    /// Where most particles are; `None` without any.
-    pub(super) fn mode(&self, cells: &Cells) -> Option<Mode> {
-        // Those that were drawn from one before are mostly in one cell still.
-        let mut by_key: Vec<(Key, f64)> = Vec::new();
-        for (particle, key) in self.particles.iter().zip(keys(&self.particles)) {
-            let weight = f64::from(particle.weight);
-            match by_key.last_mut() {
-                Some(last) if last.0 == key => last.1 += weight,
-                _ => by_key.push((key, weight)),
-            }
-        }
-        by_key.sort_by_key(|(key, _)| *key);
-        by_key.dedup_by(|next, kept| {
-            let is_same = next.0 == kept.0;
-            if is_same {
-                kept.1 += next.1;
-            }
-            is_same
-        });
-        let weight_of = |key: Key| {
-            let at = by_key.binary_search_by_key(&key, |(key, _)| *key);
-            at.map_or(0.0, |at| by_key[at].1)
-        };
-        let sums = by_key.iter().map(|(key, weight)| {
-            let around: f64 = beside(*key).map(weight_of).sum();
-            (*key, weight + around)
-        });
-        let (key, _) = sums.max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let height_m = { cells.find(self.channel, key) }
-            .and_then(|number| cells.get(number))
-            .map_or(f64::from(key[2]) * crate::tuning::cells::SIDE_M, |cell| {
-                cell.middle().z
-            });
-        let side_m = crate::tuning::cells::SIDE_M;
-        let mut middle = Vector3::new(
-            f64::from(key[0]) * side_m,
-            f64::from(key[1]) * side_m,
-            height_m,
-        );
-        for _ in 0..3 {
-            middle = self.mean_near(&middle)?;
-        }
-        self.gaussian(&middle)
-    }
-
-    /// Mean position of the particles near a point; `None` without any.
-    fn mean_near(&self, middle: &Vector3<f64>) -> Option<Vector3<f64>> {
-        let middle = <[f64; 3]>::from(*middle);
-        let (sum, whole) = simd::dispatch(
-            #[inline(always)]
-            || {
-                let (mut sum, mut whole) = ([0.0; 3], 0.0);
-                for particle in &self.particles {
-                    let weight = particle.weight_near(&middle);
-                    for (sum, at) in sum.iter_mut().zip(particle.at) {
-                        *sum += f64::from(at) * weight;
-                    }
-                    whole += weight;
-                }
-                (sum, whole)
-            },
-        );
-        (whole > 0.0).then(|| Vector3::from(sum) / whole)
-    }
-
-    /// The particles about a point as a Gaussian about a pose; `None` without any.
-    fn gaussian(&self, middle: &Vector3<f64>) -> Option<Mode> {
-        let at = <[f64; 3]>::from(*middle);
-        let (mut sin, mut cos, mut whole) = (0.0, 0.0, 0.0);
-        for particle in &self.particles {
-            let weight = particle.weight_near(&at);
-            if weight > 0.0 {
-                let (s, c) = f64::from(particle.turn_rad).sin_cos();
-                (sin, cos, whole) = (sin + s * weight, cos + c * weight, whole + weight);
-            }
-        }
-        if whole <= 0.0 {
-            return None;
-        }
-        let turn_rad = sin.atan2(cos);
-        // Of positions and turns in the map.
-        let squares = simd::dispatch(
-            #[inline(always)]
-            || {
-                let mut squares = [[0.0; 4]; 4];
-                for particle in &self.particles {
-                    let weight = particle.weight_near(&at) / whole;
-                    let turned = (f64::from(particle.turn_rad) - turn_rad) / TAU;
-                    let mut error = [0.0; 4];
-                    for axis in 0..3 {
-                        error[axis] = f64::from(particle.at[axis]) - at[axis];
-                    }
-                    error[3] = (turned - turned.round()) * TAU;
-                    for (column, one) in squares.iter_mut().zip(&error) {
-                        for (square, other) in column.iter_mut().zip(&error) {
-                            *square += one * weight * other;
-                        }
-                    }
-                }
-                squares
-            },
-        );
-        let squares = Matrix4::from(squares);
-        let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, turn_rad);
-        let rotation = turn * self.in_odom.rotation;
-        let to_body = rotation.inverse().to_rotation_matrix().into_inner();
-        let mut jacobian = Matrix6x4::zeros();
-        jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_body);
-        jacobian
-            .fixed_view_mut::<3, 1>(3, 3)
-            .copy_from(&to_body.column(2));
-        let covariance = jacobian * squares * jacobian.transpose();
-        let all: f64 = self
-            .particles
-            .iter()
-            .map(|each| f64::from(each.weight))
-            .sum();
-        Some(Mode {
-            pose: Isometry3::from_parts((*middle).into(), rotation),
-            covariance: PoseCovariance::from_upper_part(&covariance),
-            probability: whole / all * (1.0 - self.without),
-        })
     }
 
     /// Whether these log odds, and those of the views before, are enough for a claim.

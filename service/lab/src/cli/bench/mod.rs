@@ -9,6 +9,7 @@ mod load;
 mod recall;
 mod route;
 mod step;
+mod teach;
 mod touch;
 mod touch_fold;
 mod views;
@@ -32,6 +33,8 @@ pub(in crate::cli) enum BenchCommand {
     Route(route::RouteArgs),
     /// A touch and its answer, at different numbers of objects.
     Touch(touch::TouchArgs),
+    /// Objects that are taught: the pause of the map, and what is computed beside it.
+    Teach(teach::TeachArgs),
     /// Memory and cost of a sample as a team goes on and on.
     Life(life::LifeArgs),
     /// Samples that become durable, beside the raw rate of the same messages.
@@ -51,6 +54,7 @@ pub(super) fn run(command: &BenchCommand) -> anyhow::Result<()> {
         BenchCommand::Views(args) => views::run(args),
         BenchCommand::Route(args) => route::run(args),
         BenchCommand::Touch(args) => touch::run(args),
+        BenchCommand::Teach(args) => teach::run(args),
         BenchCommand::Life(args) => life::run(args),
         BenchCommand::Ingest(args) => match args.live {
             Some(live_streams) => live::run(args, live_streams.get()),

@@ -110,6 +110,7 @@ fn row(args: &TouchArgs, orientation: &Orientation, count: u32) -> Row {
     for (number, object) in (0..count).zip(&objects) {
         library.put(ObjectId(number), learned(args.plain, object, number));
     }
+    library.prepare();
     let mut by_touch = vec![Vec::new(); TOUCHES];
     let mut right = vec![0; TOUCHES];
     for episode in 0..EPISODES {

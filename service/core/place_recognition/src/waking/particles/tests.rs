@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use super::*;
 use crate::particle_numbers::floats;
@@ -53,7 +53,12 @@ fn the_mode_is_where_most_are_and_as_sure_as_they_agree() {
         let pose = Isometry3::from_parts(Vector3::new(20.0, -7.0, 0.3).into(), rotation);
         let in_odom = Isometry3::rotation(Vector3::new(0.1, 0.2, 1.3));
         let filter = filter(&pose, in_odom);
-        let mode = filter.mode(&Cells::default()).expect("particles");
+        let mut cells = Cells::default();
+        assert!(filter.mode(&cells).is_none(), "nobody is between cells");
+        for particle in &filter.particles {
+            cells.add(filter.channel, &particle.position(), (&[1.0], 1.0), 1);
+        }
+        let mode = filter.mode(&cells).expect("particles in cells");
         assert!((mode.probability - 0.9).abs() < 1e-6);
         assert!((mode.pose.translation.vector - pose.translation.vector).norm() < 0.1);
         // The covariance is that of the errors on the right of the pose, one by one.
