@@ -140,3 +140,64 @@ impl Handover {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use cognitive_map::{Label, Lesson, Record, Settings, Spacing, Touch, TouchNoise};
+
+    use super::*;
+
+    /// A map that was taught so many objects.
+    fn taught(objects: u64) -> CognitiveMap {
+        let mut map = CognitiveMap::new(Settings::default());
+        let noise = TouchNoise::new(0.001, 0.1, 0.1).expect("noise");
+        for number in 0..objects {
+            let touch = |k: u8| Touch::new([f64::from(k) * 0.02, 0.0, 0.0], noise);
+            let touches = (0..20).map(touch).collect::<Result<_, _>>();
+            let record = Record::TeachObject {
+                number,
+                name: Label::new(&format!("rod-{number}")).expect("a name"),
+                lesson: Lesson::new(Spacing::default(), touches.expect("touches")),
+            };
+            map.apply(&record, &mut Vec::new());
+        }
+        map
+    }
+
+    #[test]
+    fn objects_are_indexed_while_nobody_touches_anything() {
+        let map = taught(5);
+        let (workers, threads) = start(2);
+        let mut handover = Handover::new(workers);
+        handover.offer(&map);
+        let deadline = Instant::now() + Duration::from_secs(60);
+        while map.indexing(None).expect("objects").left() > 0 {
+            assert!(Instant::now() < deadline, "nobody indexes");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        drop(handover);
+        for thread in threads {
+            thread.join().expect("no panic");
+        }
+    }
+
+    #[test]
+    fn what_finds_no_room_is_offered_again() {
+        let map = taught(1);
+        let (sender, jobs) = sync_channel(1);
+        let other = taught(1).indexing(None).expect("an object");
+        sender.send(Job::Indexing(other)).expect("room");
+        let mut handover = Handover::new(Workers {
+            jobs: Some(sender),
+            threads: 2,
+        });
+        handover.offer(&map);
+        assert!(jobs.try_recv().is_ok() && jobs.try_recv().is_err());
+        handover.offer(&map);
+        handover.offer(&map);
+        assert!(matches!(jobs.try_recv(), Ok(Job::Indexing(job)) if job.left() == 1));
+        assert!(jobs.try_recv().is_err(), "it is handed over once");
+    }
+}

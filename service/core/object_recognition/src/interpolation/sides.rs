@@ -189,16 +189,37 @@ impl Sides {
         let mut scored: Vec<(f64, Plane)> = scored.collect();
         scored.sort_by(|a, b| b.0.total_cmp(&a.0));
         scored.truncate(SIDE_FITTED);
+        // Planes by which the same places lie are fitted once: on a flat face all are.
+        let mut fits: Vec<(u64, Option<Plane>)> = Vec::new();
+        let mut fit = |plane: &Plane| {
+            let by = self.places_by(plane, to);
+            let known = fits.iter().find(|(of, _)| *of == by);
+            let (_, fit) = known.copied().unwrap_or_else(|| {
+                let own = to
+                    .iter()
+                    .enumerate()
+                    .filter(|(number, _)| by >> number & 1 == 1);
+                let fit = (by, fitted(own.map(|(_, to)| to)));
+                fits.push(fit);
+                fit
+            });
+            fit.unwrap_or(*plane)
+        };
         let fitted = scored.iter().map(|(_, plane)| {
-            let mut plane = *plane;
-            for _ in 0..SIDE_FITS {
-                let is_by = |to: &&Vector3<f64>| self.is_by(&plane.1, &(*to - plane.0));
-                plane = fitted(to.iter().filter(is_by)).unwrap_or(plane);
-            }
+            let plane = (0..SIDE_FITS).fold(*plane, |plane, _| fit(&plane));
             (self.score(&plane, to, &lengths), plane.1)
         });
         let best = fitted.max_by(|a, b| a.0.total_cmp(&b.0));
         best.map(|(_, normal)| normal)
+    }
+
+    /// Which of the places at these offsets, 64 at most, lie by a plane.
+    fn places_by(&self, (middle, normal): &Plane, to: &[Vector3<f64>]) -> u64 {
+        let bits = to.iter().zip(0..64).map(|(to, number)| {
+            let is_by = self.is_by(normal, &(to - middle));
+            u64::from(is_by) << number
+        });
+        bits.sum()
     }
 
     /// How well a plane is tangent to a surface through these offsets: places by it, less those on
