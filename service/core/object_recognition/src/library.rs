@@ -55,9 +55,9 @@ struct Summary {
 
 /// All models that an episode may be of, with their indexes.
 ///
-/// Indexes are built when they are first needed, by whoever needs them, or before by whoever
-/// [prepares](Self::prepare) the library: a tenth of a second for hundreds of places. Recognition
-/// changes nothing here.
+/// Indexes are built when they are first needed, by whoever needs them, or before, one by
+/// [one](Self::index_one): a tenth of a second for hundreds of places. Recognition changes nothing
+/// here.
 #[derive(Clone, Debug)]
 pub struct ObjectLibrary {
     answer_probability: f64,

@@ -45,32 +45,9 @@ use state::PageItems;
 use state::write_page;
 use state::{CorruptState, State, StateReader, StateWriter};
 
-/// Version of the layout above. Version 1 had no percepts, version 2 no strengths and no gaps,
-/// version 3 no joint estimate and no keyframe graph, version 4 no views in it and no objects,
-/// version 5 no searches, version 6 no other names of landmarks, version 7 none of what was joined
-/// into objects, version 8 no attachments and no kidnap tests, version 9 nobody removed or set
-/// aside, version 10 no relaxation under way, version 11 no noise of odometry and no searches by
-/// levels, version 12 no log of views, no ways and no distances alone, version 13 no veers, no
-/// stretches of logged views, no instructions and no episodes that learn nothing, version 14 no
-/// past that is relaxed by sightings, version 15 no cells of mean views and no count of keyframes
-/// that are new, version 16 no past that is held by live estimates, version 17 no searches by
-/// levels at four nodes, version 18 no trial of the noise of odometry, version 19 no
-/// veer in the estimate, version 20 no rotation as read beside a motion, version 21 no visits of
-/// places of objects, version 22 no views of maps and nobody tracked among them, version 23 no
-/// compasses, version 24 not what a turn of the body changes in views, version 25 no bias that is
-/// read at a stand and no evidence of places of beacons, version 26 not when claims were tried
-/// last, version 27 not who teaches levels, version 28 not who teaches views,
-/// version 29 not how a sensor's sightings repeat, version 30 not how far agents have turned,
-/// version 31 not how many of their samples are lost. Version 32 learned of many views from the
-/// views themselves, and tried claims as often as at first. Version 33 matched views with the noise
-/// of rotations that is assumed, where nobody states it, and wrote no ranges of matches. Version 34
-/// did not know which robots are calibrated by views, version 35 looked for beacons with all of the
-/// assumed noise, version 36 did not know which sessions have ended, version 37 learned the noise
-/// of odometry from false sightings, too, and forgot landmarks that were refused in a row, version
-/// 38 did not know where robots saw landmarks lately, version 39 not what ties archived
-/// landmarks to others, version 40 predicted objects of few contacts from their neighbours alone,
-/// version 41 took them for bodies or lists of places, but not for either. Version 42 added up
-/// mean views by the numbers of their cells.
+/// Version of the layout above, and of what the fold makes of records: with either this number
+/// grows. A checkpoint of another version is not read, because a map that goes on from it would not
+/// be the one that the journal gives; the map is made anew from that.
 const VERSION: u16 = 43;
 
 const HEADER: u8 = 0;
