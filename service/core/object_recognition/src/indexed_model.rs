@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use crate::index::packed_places::PackedPlaces;
 use crate::indexed_place::IndexedPlace;
 use crate::interpolation::{
-    FieldVariants, Fields, LinkGraph, OpenRegion, Spread, UnpredictedGaps, interpolated,
-    missed_share,
+    Body, FieldVariants, Fields, LevelProcess, LinkGraph, OpenRegion, Spread, UnpredictedGaps,
+    interpolated, missed_share, plane_normal,
 };
 use crate::level_prior::{LevelPrior, object_levels, without_unusual_levels};
 use crate::model::{ModelPlace, ObjectModel};
@@ -32,8 +32,12 @@ pub(crate) struct IndexedModel {
     pub(crate) gap_m: f64,
     /// Distance within which contacts are of one place \[m\].
     pub(crate) spacing_m: f64,
+    /// Variance of the contacts from which it was learned, per axis \[m²\].
+    pub(crate) noise_m2: f64,
     /// Whether its places lie along lines.
     pub(crate) is_curve: bool,
+    /// The normal of the plane in which these lie, if they do.
+    pub(crate) plane: Option<Vector3<f64>>,
     /// Standard deviation of what was predicted between the places \[m\]; none where nothing was.
     pub(crate) between_sd_m: Option<f64>,
     /// Where contacts fell on places alone: probability that one is with a place that was missed.
@@ -42,11 +46,14 @@ pub(crate) struct IndexedModel {
     pub(crate) gaps: Option<UnpredictedGaps>,
     /// Distributions of its levels, by channel.
     pub(crate) own_levels: Vec<LevelPrior>,
+    /// How its levels vary together, by channel, where what lies between places is predicted.
+    pub(crate) level_processes: Vec<LevelProcess>,
     /// Where it goes on beyond what was felt; none of one that was felt all over.
     pub(crate) open: Option<OpenRegion>,
     /// The surface, if the places have normals.
     pub(crate) surfel_map: Option<Arc<SurfelMap>>,
-    has_body: bool,
+    /// The body that predicts its surface, if one does.
+    pub(crate) body: Option<Body>,
     /// By how much the places of a body are likelier chosen than random ones \[nats\].
     pub(crate) chosen_log: Option<f64>,
     shares: [f64; SHARE_BINS + 1],
@@ -112,9 +119,12 @@ impl IndexedModel {
         let body = fields.and_then(Fields::body);
         let body = body.filter(|_| between.is_some());
         let chosen_log = body.and_then(|body| body.chosen_log);
-        let has_body = body.is_some();
         let positions: Vec<_> = places.iter().map(|place| place.position).collect();
         let middle = centroid(positions.iter().map(|position| position.coords));
+        let own_levels = object_levels(places.iter().flat_map(|place| &place.levels));
+        let processes = own_levels.iter().filter(|_| between.is_some());
+        let processes =
+            processes.filter_map(|own| LevelProcess::learned(own.channel, usual, graph.typical_m));
         let radius_m = positions
             .iter()
             .map(|p| (p.coords - middle).norm())
@@ -136,11 +146,14 @@ impl IndexedModel {
             extent_m,
             gap_m: graph.typical_m,
             spacing_m,
+            noise_m2: model.noise_m2(),
             is_curve: graph.is_curve(),
+            plane: plane_normal(felt).filter(|_| graph.is_curve()),
             between_sd_m: between_sd_m(&places),
             missed_share: (spread == Spread::OnPlaces).then(|| missed_share(model.places())),
-            own_levels: object_levels(places.iter().flat_map(|place| &place.levels)),
-            has_body,
+            level_processes: processes.collect(),
+            own_levels,
+            body: body.cloned(),
             chosen_log,
             places,
         }
@@ -148,7 +161,7 @@ impl IndexedModel {
 
     /// Whether what was predicted is known from the places around alone: no body explains it.
     pub(crate) fn is_vague(&self) -> bool {
-        self.shares_errors() && !self.has_body
+        self.shares_errors() && self.body.is_none()
     }
 
     /// Whether contacts share errors: some of its places were predicted from others.

@@ -174,6 +174,17 @@ impl LevelPrior {
         priors.iter().find(|own| own.channel == channel)
     }
 
+    /// Mean and variance of the levels of most places.
+    pub(crate) fn usual(&self) -> (f64, f64) {
+        let most = self
+            .components
+            .iter()
+            .max_by(|a, b| a.share.total_cmp(&b.share));
+        most.map_or((0.0, 0.0), |own| {
+            (own.mean, own.squares / own.count.max(1.0))
+        })
+    }
+
     /// A reading of its channel, ready to be compared with places.
     pub(crate) fn rated(&self, reading: &LevelReading) -> RatedLevel {
         RatedLevel {

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod contact;
+mod gaussian_process;
 mod index;
 mod indexed_model;
 mod indexed_place;

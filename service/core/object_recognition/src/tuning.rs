@@ -105,6 +105,22 @@ pub(crate) const UNKNOWN_ERROR_REACH: f64 = 1.0;
 /// Least variance of the difference of what is predicted at two places, per that of one. Chosen:
 /// at one point both are the same.
 pub(crate) const APART_MIN: f64 = 1e-3;
+/// Contacts of an episode of which is told how likely they are together, evenly chosen. Budget.
+pub(crate) const JOINT_CONTACTS: usize = 64;
+/// Fewer of them tell nothing. Chosen.
+pub(crate) const JOINT_CONTACTS_MIN: usize = 8;
+/// Deviations from what is predicted beyond which a contact or a level is another's. Chosen.
+pub(crate) const JOINT_SDS: f64 = 4.0;
+/// Share of the variance of what is predicted across a surface that is common within a gap alone
+/// ([`ERROR_REACH`]); the rest is common over a side. Chosen.
+pub(crate) const LOCAL_ERROR_SHARE: f64 = 0.5;
+/// By how much the surface of another object is elsewhere, per extent: objects of about one size
+/// differ in theirs by a seventh. Chosen.
+pub(crate) const SHAPE_SD: f64 = 0.07;
+/// Distance over which that is common, per extent: a third of it. Chosen.
+pub(crate) const SHAPE_REACH: f64 = 0.35;
+/// Prior deviation of a pose about the likeliest one \[m\]. Chosen.
+pub(crate) const POSE_PRIOR_M: f64 = 0.03;
 /// Objects against each of which an unknown one has to be earned, the likeliest. Budget.
 pub(crate) const EARNED_MAX: usize = 6;
 /// Least probability that a contact is the first one on what was explored. Chosen.
@@ -154,6 +170,23 @@ pub(crate) const SHORTLIST_SLACK: f64 = 0.5;
 /// Radius of a list of places, per reach of a search that shares it, at most: a narrow search would
 /// look at too many places of a wide list. At least 1 + `SHORTLIST_SLACK`. Chosen.
 pub(crate) const SHORTLIST_WIDEST: f64 = 2.5;
+
+// Translations: the second search.
+
+/// Contacts after which poses are looked for again. Budget.
+pub(crate) const SEARCHED_AFTER: [usize; 3] = [24, 48, 96];
+/// Contacts by which they are found, far apart from one another. Budget.
+pub(crate) const SEARCHED_CONTACTS: usize = 24;
+/// Places and rotations where they are sought, of the likeliest models. Budget.
+pub(crate) const SEARCHED_SEEDS_MAX: usize = 1 << 14;
+/// Poses that are looked at. Budget.
+pub(crate) const SEARCHED_POSES: usize = 32;
+/// Places of the first contact by which each is replayed. Budget.
+pub(crate) const SEARCHED_SEEDS: usize = 2;
+/// How much less likely they may be than the best of them \[nats\]. Chosen.
+pub(crate) const SEARCHED_NATS: f64 = 12.0;
+/// Deviations within which a pose is that of a hypothesis. Chosen.
+pub(crate) const SEARCHED_SDS: f64 = 2.0;
 
 // Translations: the prefilter.
 

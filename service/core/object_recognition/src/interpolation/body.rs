@@ -2,17 +2,18 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Point3, SMatrix, Vector3};
+use nalgebra::{Point3, SMatrix, SVector, Vector3};
 
 use super::body_fit::{BodyFit, Candidate};
 use super::graph::{LinkGraph, median};
-use super::superellipsoid::{PARAMETERS, Superellipsoid};
+use super::superellipsoid::{PARAMETERS, PARAMETERS_OF_FORM, Superellipsoid};
 use super::tails;
 use super::taken::Taken;
 use super::tuning::{
     BODY_FOLD_STEPS, BODY_FOLDS, BODY_MISSED_SDS, BODY_PLACES, BODY_PROBABILITY_MIN,
-    CHOSEN_RATIO_SD, CORE_MAX, REGULARITY_MAX, REGULARITY_SD, SIDE_NORMAL_COS,
-    SIDE_PROBABILITY_MIN, SIDE_SAMPLES, SIDE_SAMPLES_APART, UNEXPECTED_SHARE,
+    CHOSEN_RATIO_SD, CORE_MAX, EXPONENT_LOG_SD, REGULARITY_MAX, REGULARITY_SD, SIDE_NORMAL_COS,
+    SIDE_PROBABILITY_MIN, SIDE_SAMPLES, SIDE_SAMPLES_APART, SIZE_APART_SD, TAPER_SD,
+    UNEXPECTED_SHARE,
 };
 use crate::model::ModelPlace;
 
@@ -58,7 +59,57 @@ impl LeftOutErrors {
     }
 }
 
+/// A point as a body predicts it.
+#[derive(Clone, Debug)]
+pub(crate) struct BodyPoint {
+    /// Distance from the surface; inside it is negative \[m\].
+    pub(crate) off_m: f64,
+    /// Direction across the surface, outwards.
+    pub(crate) across: Vector3<f64>,
+    /// Variance of the surface about the body there \[m²\].
+    pub(crate) surface_m2: f64,
+    /// How much the distance grows with each parameter.
+    slopes: SVector<f64, PARAMETERS>,
+    /// The same by the covariance of the parameters.
+    by_covariance: SVector<f64, PARAMETERS>,
+}
+
+impl BodyPoint {
+    /// Covariance of the distances of two points, by that of the parameters \[m²\].
+    pub(crate) fn covariance_m2(&self, other: &Self) -> f64 {
+        self.slopes.dot(&other.by_covariance)
+    }
+
+    /// The same by how much the bodies of objects differ in size, exponents and taper \[m²\].
+    pub(crate) fn apart_m2(&self, other: &Self) -> f64 {
+        let sds = [SIZE_APART_SD; 3].into_iter();
+        let sds = sds.chain([EXPONENT_LOG_SD, EXPONENT_LOG_SD, TAPER_SD]);
+        let form = sds.zip(PARAMETERS_OF_FORM);
+        form.map(|(sd, number)| sd * sd * self.slopes[number] * other.slopes[number])
+            .sum()
+    }
+}
+
 impl Body {
+    /// A point as it predicts it.
+    pub(crate) fn about(&self, point: &Point3<f64>) -> BodyPoint {
+        let distance = self.form.distance(point);
+        BodyPoint {
+            off_m: distance.off_m,
+            across: distance.normal,
+            surface_m2: self.surface_m2 + self.others_m2(point, distance.off_m),
+            by_covariance: self.covariance * distance.slopes,
+            slopes: distance.slopes,
+        }
+    }
+
+    /// Variance of a point's distance over the bodies that are nearly as likely \[m²\].
+    fn others_m2(&self, point: &Point3<f64>, off_m: f64) -> f64 {
+        let others = self.others.iter();
+        let apart = others.map(|(p, form)| p * (form.distance(point).off_m - off_m).powi(2));
+        apart.sum()
+    }
+
     /// The body of the largest likelihood, and the log-likelihood per place, each predicted by the
     /// body of others, as [`Field::learned`](super::field::Field::learned) has it of the places
     /// around. None of a curve and of what lies in a plane.

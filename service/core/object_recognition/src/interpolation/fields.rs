@@ -60,10 +60,6 @@ impl FieldVariants {
             .iter()
             .map(|(_, field)| field.predicted_nats(&anywhere, places));
         let told_nats = told.fold(f64::INFINITY, f64::min);
-        // Where the levels around mislead, nothing is predicted.
-        if told_nats < 0.0 {
-            return Self::default();
-        }
         let are_told = told_nats >= PREDICTED_NATS;
         // Nothing lies between places on which contacts fall alone.
         if !are_told && spread != Spread::Even {

@@ -2,13 +2,13 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::Point3;
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::graph::LinkGraph;
 use super::spread::Spread;
 use super::tuning::{
     BETWEEN_MIN, ENTRIES_MAX, ENTRY_REACH, EXPLORED_REACH, FLAT_SHARE, MISSING_PER_KNOWN,
-    PARTIAL_PRIOR, UNEXPECTED_SHARE, UNEXPLORED_MIN,
+    PARTIAL_PRIOR, STAY_PER_MISSING, UNEXPECTED_SHARE, UNEXPLORED_MIN,
 };
 use crate::index::nearest_place::NearestPlace;
 use crate::numeric::centroid;
@@ -30,6 +30,10 @@ pub(crate) struct OpenRegion {
     pub(crate) unexplored: f64,
     /// Length of what was felt, or the side of a square as large \[m\].
     known_m: f64,
+    /// The same of what is missing \[m\].
+    missing_m: f64,
+    /// How much is missing, per what was felt.
+    missing_odds: f64,
 }
 
 /// Part of space, as far as a model tells.
@@ -72,7 +76,7 @@ impl OpenRegion {
         let all = positions;
         let felt = &positions[..felt];
         let is_curve = graph.is_curve();
-        let everywhere = is_curve && !is_flat(felt);
+        let everywhere = is_curve && plane_normal(felt).is_none();
         let pieces = graph.edges(felt, is_curve);
         let mut is_open = vec![everywhere; felt.len()];
         for own in pieces.iter().flatten() {
@@ -138,6 +142,12 @@ impl OpenRegion {
             } else {
                 graph.typical_m * count.sqrt()
             },
+            missing_m: if is_curve && !everywhere {
+                missing
+            } else {
+                graph.typical_m * missing.sqrt()
+            },
+            missing_odds: missing / known.max(f64::MIN_POSITIVE),
         })
     }
 
@@ -151,10 +161,23 @@ impl OpenRegion {
         (FIELD_PER_SPACING * self.typical_m).powi(2)
     }
 
-    /// Probability that a walk over what was not felt is still there after a step \[m\]: what is
-    /// missing is about half as long as what was felt.
-    pub(crate) fn stay(&self, step_m: f64) -> f64 {
+    /// Probability that a walk where the surface is not as predicted is still there after a step
+    /// \[m\]: such a part is about half as long as what was felt.
+    pub(crate) fn stay_in_gap(&self, step_m: f64) -> f64 {
         (-step_m / (MISSING_PER_KNOWN * self.known_m).max(f64::MIN_POSITIVE)).exp()
+    }
+
+    /// Probability that a walk beyond what was felt is still there after a step \[m\].
+    pub(crate) fn stay_beyond(&self, step_m: f64) -> f64 {
+        (-step_m / (STAY_PER_MISSING * self.missing_m).max(f64::MIN_POSITIVE)).exp()
+    }
+
+    /// Probability that a step \[m\] from what was felt leads beyond it: as many lead there as
+    /// back, so that it is the less the less is missing. The first one needs something to be
+    /// missing at all.
+    pub(crate) fn leave(&self, step_m: f64, has_left: bool) -> f64 {
+        let prior = if has_left { 1.0 } else { PARTIAL_PRIOR };
+        ((1.0 - self.stay_beyond(step_m)) * self.missing_odds * prior).min(1.0)
     }
 
     /// What the model says of a point.
@@ -187,15 +210,15 @@ fn missing_m(felt: &[Point3<f64>], ends: &[u32]) -> f64 {
     0.5 * gaps.sum::<f64>()
 }
 
-/// Whether all places lie in a plane.
-fn is_flat(felt: &[Point3<f64>]) -> bool {
+/// The normal of the plane in which all places lie, if they do.
+pub(crate) fn plane_normal(felt: &[Point3<f64>]) -> Option<Vector3<f64>> {
     let middle = centroid(felt.iter().map(|position| position.coords));
     let spread = felt.iter().map(|position| {
         let apart = position.coords - middle;
         apart * apart.transpose()
     });
-    let values = spread
-        .sum::<nalgebra::Matrix3<f64>>()
-        .symmetric_eigenvalues();
-    values.min() < FLAT_SHARE * values.max()
+    let axes = spread.sum::<Matrix3<f64>>().symmetric_eigen();
+    let (least, value) = axes.eigenvalues.argmin();
+    let is_flat = value < FLAT_SHARE * axes.eigenvalues.max();
+    is_flat.then(|| axes.eigenvectors.column(least).into_owned())
 }

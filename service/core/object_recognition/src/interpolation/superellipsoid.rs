@@ -1,10 +1,14 @@
 //! Superellipsoids: one form for balls, boxes, cylinders and what lies between them.
 
+use std::ops::Range;
+
 use nalgebra::{Matrix3, Point3, SVector, UnitQuaternion, Vector3};
 
 /// Numbers of a superellipsoid: three each of place, turn and size, the logarithms of two
 /// exponents, and its taper.
 pub(super) const PARAMETERS: usize = 12;
+/// Those of size, exponents and taper.
+pub(super) const PARAMETERS_OF_FORM: Range<usize> = 6..PARAMETERS;
 /// Least width of a tapered body, per that at its middle: beyond its tip there is none.
 const WIDTH_MIN: f64 = 0.05;
 

@@ -33,8 +33,10 @@ pub(super) const UNEXPECTED_SHARE: f64 = 0.5;
 /// Prior probability that an object with an open edge was felt in part only: others have an edge of
 /// their own. Chosen.
 pub(super) const PARTIAL_PRIOR: f64 = 0.1;
-/// Mean length of what is missing of such an object, per that of what was felt. Chosen.
+/// Mean length of a part that is not as predicted, per that of what was felt. Chosen.
 pub(super) const MISSING_PER_KNOWN: f64 = 0.5;
+/// Length that a walk stays beyond what was felt, per length of what is missing. Chosen.
+pub(super) const STAY_PER_MISSING: f64 = 0.5;
 /// Distance from where it begins at which a walk may enter what was explored, in typical links.
 /// Chosen.
 pub(super) const ENTRY_REACH: f64 = 1.5;
@@ -69,6 +71,18 @@ pub(super) const FIELD_SAMPLES: usize = 96;
 pub(super) const FIELD_LENGTHS: [f64; 4] = [0.7, 1.5, 3.0, 6.0];
 /// Noise of a field that is tried, per its variance. Chosen.
 pub(super) const FIELD_NOISES: [f64; 4] = [1e-4, 1e-2, 0.1, 1.0];
+/// Lengths of the process of an object's levels that are tried, in typical links. Chosen.
+pub(super) const PROCESS_LENGTHS: [f64; 3] = [1.5, 3.0, 6.0];
+/// Variances of what is rough besides, per that of the process. Chosen.
+pub(super) const PROCESS_ROUGHNESS: [f64; 6] = [1e-3, 0.03, 0.1, 0.3, 1.0, 3.0];
+/// The least of them that counts: twenty levels do not tell that none is rough. Chosen.
+pub(super) const PROCESS_ROUGHNESS_MIN: f64 = 0.03;
+/// Lengths of what is rough, in typical links. Chosen.
+pub(super) const PROCESS_ROUGH_LENGTHS: [f64; 3] = [1.0, 0.3, 0.1];
+/// Least variance of a level's noise, per that of the process. Chosen.
+pub(super) const PROCESS_NUGGET: f64 = 1e-3;
+/// Places by which such a process predicts. Budget.
+pub(super) const PROCESS_PLACES: usize = 256;
 /// Fewer places tell nothing of what lies between and beyond them: of twenty contacts some fall on
 /// one place. Chosen.
 pub(super) const BETWEEN_MIN: usize = 16;
@@ -122,6 +136,8 @@ pub(super) const EXPONENT_LOG_SD: f64 = 1.0;
 pub(super) const EXPONENT_LOG_RANGE: [f64; 2] = [0.3, 3.7];
 /// Standard deviation of the logarithm of a body's sizes. Chosen.
 pub(super) const SIZE_LOG_SD: f64 = 1.0;
+/// The same of how two objects of a hand's size differ: by a half. Chosen.
+pub(super) const SIZE_APART_SD: f64 = 0.5;
 /// Standard deviation of a body's taper. Chosen.
 pub(super) const TAPER_SD: f64 = 0.3;
 /// Largest taper: a body with a tip. Chosen.

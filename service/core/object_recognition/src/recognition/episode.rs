@@ -16,7 +16,9 @@ use crate::posterior::{Posterior, entropy_nats};
 use crate::recognition::likelihoods::{step_share_logs, unknown_fit_log, walk_log};
 use crate::surfels::map::SurfelMap;
 use crate::translations::GaussianSum;
-use crate::tuning::{CONTACTS_MAX, LISTED_SHARE_MIN, REACH_PER_STEP, RIVALS_MAX, UNKNOWN_PRIOR};
+use crate::tuning::{
+    CONTACTS_MAX, LISTED_SHARE_MIN, REACH_PER_STEP, RIVALS_MAX, SEARCHED_AFTER, UNKNOWN_PRIOR,
+};
 use crate::variant::VariantId;
 
 /// The state of one episode of recognition.
@@ -114,6 +116,12 @@ impl Recognition {
         }
         self.contacts.push(contact);
         self.unknown_logs.push(unknown_log);
+        if let Hypotheses::Translations(translations) = &mut self.hypotheses
+            && SEARCHED_AFTER.contains(&self.count)
+        {
+            translations.search_again(library, &self.contacts);
+            translations.settle();
+        }
     }
 
     /// A contact as exactly as it is known in the frame of a hypothesis, whose rotation is off by

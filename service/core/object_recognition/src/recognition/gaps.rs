@@ -51,7 +51,13 @@ mod tests {
     /// What an episode tells of which so many contacts lay in gaps and on places.
     fn told(gaps: u8, places: u8) -> f64 {
         let [gaps, places] = [gaps, places].map(f32::from);
-        told_by_gaps(Falls { gaps, places }, MISSED_SHARE)
+        let beyond = 0.0;
+        let falls = Falls {
+            gaps,
+            places,
+            beyond,
+        };
+        told_by_gaps(falls, MISSED_SHARE)
     }
 
     #[test]

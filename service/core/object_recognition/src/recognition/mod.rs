@@ -4,6 +4,7 @@ mod dependence;
 mod episode;
 mod explanation;
 mod gaps;
+mod joint_evidence;
 mod likelihoods;
 mod masses;
 mod unknown;

@@ -12,6 +12,7 @@ use crate::recognition::dependence::evidence_share;
 use crate::recognition::episode::Hypotheses;
 use crate::recognition::episode::Recognition;
 use crate::recognition::gaps::told_by_gaps;
+use crate::recognition::joint_evidence::log_bayes_factor;
 use crate::recognition::likelihoods::step_share_logs;
 use crate::translations::{GaussianSum, UnknownLogs};
 use crate::tuning::{
@@ -70,8 +71,9 @@ impl Recognition {
 
     /// Log-likelihood of an unknown object, as it counts, in the measure of translations.
     ///
-    /// Over the best one an unknown object leads by the least of its leads over the likeliest. The
-    /// odds between known objects stay as they are.
+    /// Over the best one an unknown object leads by the least of its leads over the likeliest, but
+    /// keeps the odds of [`doubt`] where it leads over the best one. The odds between known objects
+    /// stay as they are.
     pub(super) fn earned(
         &self,
         library: &ObjectLibrary,
@@ -90,24 +92,24 @@ impl Recognition {
             let leads = unknown.plus(-log);
             self.earned_lead(library, translations, object, (&logs, leads, doubt))
         };
-        let over_best = unknown.log() - best.1;
-        let earned = lead(best).unwrap_or(over_best);
+        let earned = lead(best).unwrap_or(unknown.log() - best.1);
         if earned <= 0.0 {
             return best.1 + earned;
         }
         let others = likeliest.into_iter().take(EARNED_MAX).skip(1);
         let leads = others.filter_map(lead);
-        best.1 + leads.fold(over_best.min(earned), f64::min)
+        best.1 + leads.fold(earned, f64::min).max(earned.min(doubt))
     }
 
     /// The lead of an unknown object over a known one, as it counts; none where that has no
     /// hypothesis left. `leads` are those by all contacts, `logs` the masses of the variants.
     ///
-    /// Contacts in one gap of a model share its errors. So the lead of an unknown object, or of the
-    /// known one over what the library predicts, counts as that of fewer contacts. The lead of the
-    /// known one over levels that are predicted from the contacts before counts in full: of an
-    /// error that contacts share, those before told. An unknown object that leads by all contacts
-    /// keeps the odds of [`doubt`], by which it comes first and nothing is answered.
+    /// Contacts in one gap of a model share its errors, so that one after the other they tell the
+    /// same again and again. Where a model predicts what lies between its places, the known object
+    /// leads by what all contacts tell together ([`log_bayes_factor`]), and by no more than one
+    /// after the other tells over all of its poses. An unknown object that leads counts as by fewer
+    /// contacts, and keeps the odds of [`doubt`], by which it comes first and nothing is answered.
+    /// Of few contacts each lead counts as that of fewer ones.
     ///
     /// Of an object whose contacts fell on places alone, what [`told_by_gaps`] adds to a lead takes
     /// an answer away, but calls nothing unknown: at a place that was missed a known object is
@@ -149,8 +151,13 @@ impl Recognition {
         }
         let pose = pose()?;
         let share = |reach| evidence_share(indexed, &pose, &self.contacts, reach);
+        let joint = log_bayes_factor(indexed, library.level_prior(), &pose, &self.contacts);
+        let lead = joint.map_or(lead, |joint| f64::max(-joint, leads.library));
         if lead > 0.0 {
             return Some(f64::max(lead * share(UNKNOWN_ERROR_REACH), lead.min(doubt)));
+        }
+        if joint.is_some() {
+            return Some(lead);
         }
         let library = leads.library * share(ERROR_REACH);
         Some(UnknownLogs { library, ..leads }.log().min(0.0))

@@ -176,16 +176,38 @@ fn gaps_of_which_neighbours_tell_nothing_call_nothing_unknown() {
             assert_ne!(verdict, Verdict::Unknown, "{own} after {count} touches");
         }
     }
-    // Strangers are rather unknown than any of these.
-    for stranger in 1000..1005 {
+}
+
+/// Of twenty boxes of twenty contacts, between which no level follows from the others, most are
+/// named by what all contacts of a walk tell together, and strangers are rather unknown.
+#[test]
+fn boxes_of_few_contacts_are_told_from_strangers() {
+    let posterior = |library: &ObjectLibrary, box_number: u64, contacts| {
         let mut recognition = Recognition::new(&Orientation::Known);
-        for contact in run_over(BANDS, stranger, 100) {
-            recognition.touch(&library, contact);
+        for contact in run_over(BANDS, box_number, contacts) {
+            recognition.touch(library, contact);
         }
-        let posterior = recognition.posterior(&library);
-        let best = posterior.objects[0].1;
-        assert!(posterior.unknown > best, "{stranger}: {posterior:?}");
+        recognition.posterior(library)
+    };
+    let (mut right, mut named, mut unknown) = (0, 0, 0);
+    for first in [0, 10, 20, 30] {
+        let library = taught(BANDS, first..first + 5, 20);
+        for (id, own) in (0u32..).zip(first..first + 5) {
+            let verdict = posterior(&library, own, 200).verdict();
+            right += u32::from(verdict == Verdict::Object(ObjectId(id)));
+            let is_own = verdict == Verdict::Object(ObjectId(id));
+            assert!(
+                is_own || verdict == Verdict::Undecided,
+                "{own}: {verdict:?}"
+            );
+            let stranger = posterior(&library, 5000 + own, 100);
+            named += u32::from(matches!(stranger.verdict(), Verdict::Object(_)));
+            unknown += u32::from(stranger.unknown > stranger.objects[0].1);
+        }
     }
+    assert!(right >= 15, "{right} of twenty");
+    assert_eq!(named, 0, "strangers");
+    assert!(unknown >= 18, "{unknown} of twenty strangers");
 }
 
 #[test]

@@ -29,15 +29,15 @@ use crate::variant::VariantId;
 pub(crate) struct GaussianSum {
     pub(crate) rotations: Vec<UnitQuaternion<f64>>,
     /// The exact hypotheses, by model, rotation and place.
-    all: Vec<TranslationHypothesis>,
+    pub(super) all: Vec<TranslationHypothesis>,
     /// The seeds that were not promoted.
     prefilter: Prefilter,
     /// Episodes that were on nothing explored so far.
-    unexplored: Unexplored,
+    pub(super) unexplored: Unexplored,
     /// Log-likelihoods of the contacts under an unknown object, without those that were asked for.
     pub(crate) background: BackgroundModel,
     /// Logs of the factors that all masses of each model have for its size.
-    sizes: BTreeMap<VariantId, f64>,
+    pub(super) sizes: BTreeMap<VariantId, f64>,
 }
 
 impl GaussianSum {
@@ -76,9 +76,7 @@ impl GaussianSum {
         reach_m: Option<f64>,
     ) -> Option<f64> {
         let Some(last) = before.last() else {
-            self.prefilter = Prefilter::new(library, &self.rotations, contact);
-            self.unexplored = Unexplored::new(library);
-            self.resize(sizes);
+            self.begin(library, contact, sizes, &|_, _| true);
             return None;
         };
         self.resize(sizes);
@@ -104,6 +102,19 @@ impl GaussianSum {
         self.all = merged(&parts);
         self.prune(library);
         Some(unknown?.log)
+    }
+
+    /// The first contact, with one of these models.
+    pub(super) fn begin(
+        &mut self,
+        library: &ObjectLibrary,
+        contact: &Contact,
+        sizes: BTreeMap<VariantId, f64>,
+        holds: &impl Fn(VariantId, &IndexedModel) -> bool,
+    ) {
+        self.prefilter = Prefilter::new(library, &self.rotations, contact, holds);
+        self.unexplored = Unexplored::new(library, holds);
+        self.resize(sizes);
     }
 
     /// Changes the factors that the masses of each model have for its size.
@@ -208,7 +219,7 @@ impl GaussianSum {
 
     /// Drops hypotheses without evidence, and the lightest beyond the budget; each model keeps its
     /// best.
-    fn prune(&mut self, library: &ObjectLibrary) {
+    pub(super) fn prune(&mut self, library: &ObjectLibrary) {
         let most = TRANSLATIONS_MAX;
         let evidences = self.all.iter().map(|hypothesis| hypothesis.evidence);
         let best = evidences.fold(self.prefilter.best_log(), f64::max);

@@ -37,6 +37,8 @@ pub(crate) struct Falls {
     pub(crate) gaps: f32,
     /// On places.
     pub(crate) places: f32,
+    /// Beyond what was felt.
+    pub(crate) beyond: f32,
 }
 
 impl TranslationHypothesis {

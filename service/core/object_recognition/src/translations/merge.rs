@@ -50,7 +50,7 @@ fn sum<'a>(
         .map(|own| own.evidence)
         .fold(f64::NEG_INFINITY, f64::max);
     let (mut mass, mut mean, mut square, mut variance) = (0.0, first.translation * 0.0, 0.0, 0.0);
-    let (mut gaps, mut places) = (0.0, 0.0);
+    let (mut gaps, mut places, mut beyond) = (0.0, 0.0, 0.0);
     for own in others {
         let weight = (own.evidence - most).exp();
         // From the first one, so that no digits are lost.
@@ -61,6 +61,7 @@ fn sum<'a>(
         variance += weight * own.variance_m2;
         gaps += weight * f64::from(own.falls.gaps);
         places += weight * f64::from(own.falls.places);
+        beyond += weight * f64::from(own.falls.beyond);
     }
     mean /= mass;
     let spread = (square / mass - mean.norm_squared()).max(0.0);
@@ -71,6 +72,7 @@ fn sum<'a>(
         falls: Falls {
             gaps: to_f32(gaps / mass),
             places: to_f32(places / mass),
+            beyond: to_f32(beyond / mass),
         },
         ..first
     })

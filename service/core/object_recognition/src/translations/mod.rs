@@ -9,6 +9,7 @@ mod mass_histogram;
 mod merge;
 mod prefilter;
 mod prefilter_group;
+mod second_search;
 mod shared_error;
 mod split;
 mod touch_update;

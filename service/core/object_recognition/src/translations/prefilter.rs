@@ -38,13 +38,15 @@ pub(crate) struct Seed {
 }
 
 impl Prefilter {
-    /// After the first touch of an episode.
+    /// After the first touch of an episode, over these models.
     pub(crate) fn new(
         library: &ObjectLibrary,
         rotations: &[UnitQuaternion<f64>],
         contact: &Contact,
+        holds: &impl Fn(VariantId, &IndexedModel) -> bool,
     ) -> Self {
-        let places = library.variants().map(|(_, own)| own.places.len());
+        let variants = || library.variants().filter(|(of, own)| holds(*of, own));
+        let places = variants().map(|(_, own)| own.places.len());
         let stride = (places.sum::<usize>() * rotations.len()).div_ceil(SEEDS_MAX);
         let stride = stride.max(1);
         let mut prefilter = Self {
@@ -54,7 +56,7 @@ impl Prefilter {
         };
         let percepts = ContactPercepts::new(contact, library.level_prior());
         let mut likelihoods = Vec::new();
-        for (of, known) in library.variants() {
+        for (of, known) in variants() {
             let places = known.places.len() * rotations.len();
             let unexplored = known.open.as_ref().map_or(0.0, |open| open.unexplored);
             let each = (1.0 - unexplored) * stride as f64 / places.max(1) as f64;
@@ -240,6 +242,42 @@ impl Prefilter {
             }
         }
         best
+    }
+
+    /// The `most` seeds of a hypothesis' model and rotation that are nearest to it.
+    pub(crate) fn nearest(
+        &self,
+        own: &TranslationHypothesis,
+        rotations: &[UnitQuaternion<f64>],
+        most: usize,
+    ) -> Vec<Seed> {
+        let Some(contact) = self.first.as_ref() else {
+            return Vec::new();
+        };
+        let first = ContactPercepts::new(contact, &[]);
+        let mut near: Vec<(f64, Seed)> = Vec::new();
+        for (group, of) in self.groups.iter().enumerate() {
+            if (of.of, of.rotation) != own.map() {
+                continue;
+            }
+            for (number, weight) in of.weights.iter().copied().enumerate() {
+                let seed = of.hypothesis(number, &rotations[usize::from(of.rotation)], &first);
+                let square = (seed.translation - own.translation).norm_squared();
+                let seed = Seed {
+                    group,
+                    number,
+                    weight,
+                };
+                near.push((square, seed));
+            }
+        }
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        near.into_iter().take(most).map(|(_, seed)| seed).collect()
+    }
+
+    /// Whether a seed was not taken.
+    pub(crate) fn has(&self, seed: &Seed) -> bool {
+        self.groups[seed.group].weights[seed.number] > 0.0
     }
 
     /// A seed as a hypothesis with its estimated mass.

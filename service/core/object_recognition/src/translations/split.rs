@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, UnitQuaternion};
 
 use crate::indexed_model::IndexedModel;
+use crate::interpolation::Part;
 use crate::library::ObjectLibrary;
 use crate::numeric::to_f32;
 use crate::percept_likelihood::PerceptLikelihood;
@@ -95,14 +96,18 @@ impl SplitBuffers {
             let error = shared.as_ref();
             densities = (self.search).conditioned(indexed, error, [prior, noise], candidates);
         }
-        let unpredicted = touch.unpredicted(hypothesis.of(), indexed, &point, one * densities);
+        let unpredicted =
+            touch.unpredicted(hypothesis, (indexed, rotation), &point, one * densities);
         let beyond = unpredicted.map_or(0.0, |own| own.density);
         let outlier = (touch.outlier + beyond) / one;
         let total = outlier + densities;
         let mut falls = hypothesis.falls;
+        if unpredicted.is_some_and(|own| own.part == Part::Beyond) {
+            falls.beyond += to_f32(beyond / (one * total));
+        }
         if let Some(own) = unpredicted.filter(|_| indexed.missed_share.is_some()) {
             falls.places += to_f32(densities / total);
-            if own.is_gap {
+            if own.part == Part::Gap {
                 falls.gaps += to_f32(beyond / (one * total));
             }
         }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, UnitQuaternion};
 
 use crate::contact::{Contact, LevelReading};
 use crate::indexed_model::IndexedModel;
@@ -10,6 +10,7 @@ use crate::interpolation::Part;
 use crate::level_prior::{LevelPrior, RatedLevel};
 use crate::library::ObjectLibrary;
 use crate::percept_likelihood::ContactPercepts;
+use crate::translations::hypothesis::TranslationHypothesis;
 use crate::tuning::OUTLIER_SHARE;
 use crate::variant::VariantId;
 
@@ -21,6 +22,8 @@ pub(crate) struct TouchUpdate<'a> {
     pub(crate) nearest: ContactPercepts<'a>,
     /// Variance of that contact, as it is known now, per axis \[m²\].
     pub(crate) nearest_m2: f64,
+    /// Where the contact before it was.
+    last_m: Point3<f64>,
     /// Levels that both of them have.
     pub(crate) level_pairs: Vec<LevelPair>,
     /// Variance of the drift of path integration since the touch before, per axis \[m²\].
@@ -49,12 +52,12 @@ pub(crate) struct UnpredictedDensity {
 }
 
 /// A touch of what a model does not predict.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Unpredicted {
     /// Its density times its share \[1/m³\].
     pub(crate) density: f64,
-    /// Whether it is in a gap between places.
-    pub(crate) is_gap: bool,
+    /// The part of space where it lies.
+    pub(crate) part: Part,
 }
 
 impl<'a> TouchUpdate<'a> {
@@ -82,6 +85,7 @@ impl<'a> TouchUpdate<'a> {
         Self {
             percepts: ContactPercepts::new(contact, level_prior),
             nearest: ContactPercepts::new(nearest, level_prior),
+            last_m: last.position_m,
             nearest_m2: nearest.position_sd_m.powi(2) + drift_m2(nearest),
             level_pairs: nearest.levels.iter().filter_map(pair).collect(),
             drift_m2: drift_m2(last),
@@ -90,33 +94,42 @@ impl<'a> TouchUpdate<'a> {
         }
     }
 
-    /// The touch at a point, if it is one of what a model does not predict;
+    /// The touch of a hypothesis at a point, if it is one of what its model does not predict;
     /// `explored` is the density of what it does. None where nothing is known of that.
     pub(crate) fn unpredicted(
         &self,
-        of: VariantId,
-        indexed: &IndexedModel,
+        hypothesis: &TranslationHypothesis,
+        (indexed, rotation): (&IndexedModel, &UnitQuaternion<f64>),
         point: &Point3<f64>,
         explored: f64,
     ) -> Option<Unpredicted> {
-        let density = self.unexplored.get(&of);
+        let density = self.unexplored.get(&hypothesis.of());
         let (density, open) = density.zip(indexed.open.as_ref())?;
         if explored >= density.gap.max(density.open) {
-            return Some(Unpredicted::default());
+            return Some(Unpredicted {
+                density: 0.0,
+                part: Part::Known,
+            });
         }
         let part = open.part(point);
         let (share, density) = match part {
             Part::Known => (0.0, 0.0),
             Part::Gap => (open.unexpected, density.gap),
-            Part::Beyond => (1.0, density.open),
+            Part::Beyond => {
+                let before = Point3::from(rotation * self.last_m.coords + hypothesis.translation);
+                let share = if open.part(&before) == Part::Beyond {
+                    1.0
+                } else {
+                    let has_left = hypothesis.falls.beyond > 0.5;
+                    open.leave((point - before).norm(), has_left)
+                };
+                (share, density.open)
+            }
         };
+        let is_likelier = explored < density;
         Some(Unpredicted {
-            density: if explored < density {
-                share * density
-            } else {
-                0.0
-            },
-            is_gap: part == Part::Gap,
+            density: if is_likelier { share * density } else { 0.0 },
+            part,
         })
     }
 }

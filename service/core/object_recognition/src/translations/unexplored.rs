@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use nalgebra::UnitQuaternion;
 
 use crate::contact::Contact;
+use crate::indexed_model::IndexedModel;
 use crate::level_prior::likelihood_below_one;
 use crate::library::ObjectLibrary;
 use crate::numeric::log_sum;
 use crate::translations::background::UnknownContact;
 use crate::translations::hypothesis::{Falls, TranslationHypothesis};
 use crate::translations::touch_update::UnpredictedDensity;
-use crate::tuning::{ENTER_MIN, PREFILTER_CONTACTS_MAX};
+use crate::tuning::{CONTACTS_MAX, ENTER_MIN};
 use crate::variant::VariantId;
 
 /// Where an episode may have been that knows no place of an object: on what was not explored of it.
@@ -24,15 +25,18 @@ use crate::variant::VariantId;
 pub(crate) struct Unexplored {
     /// Log of the mass of the episodes that were nowhere else so far.
     pub(crate) logs: BTreeMap<VariantId, f64>,
-    /// Densities of the contacts after the first, as far as seeds may be promoted by them.
+    /// Densities of the contacts after the first, as far as hypotheses may be replayed by them.
     pub(crate) history: Vec<BTreeMap<VariantId, UnpredictedDensity>>,
 }
 
 impl Unexplored {
-    /// After the first contact.
-    pub(crate) fn new(library: &ObjectLibrary) -> Self {
-        let logs = library
-            .variants()
+    /// After the first contact, with one of these models.
+    pub(crate) fn new(
+        library: &ObjectLibrary,
+        holds: &impl Fn(VariantId, &IndexedModel) -> bool,
+    ) -> Self {
+        let logs = { library.variants() }
+            .filter(|(of, indexed)| holds(*of, indexed))
             .filter_map(|(of, indexed)| Some((of, indexed.open.as_ref()?.unexplored.ln())));
         Self {
             logs: logs.collect(),
@@ -66,11 +70,11 @@ impl Unexplored {
             let own = &indexed.own_levels;
             let alike = likelihood_below_one(contact, own, library.level_prior());
             let step_m = (contact.position_m - last.position_m).norm();
-            let stay = indexed.open.as_ref()?.stay(step_m);
-            let density = |log: f64| stay * alike * (log + share(*of)).exp();
+            let open = indexed.open.as_ref()?;
+            let density = |log: f64, stay: f64| stay * alike * (log + share(*of)).exp();
             let density = UnpredictedDensity {
-                gap: density(unknown.log),
-                open: density(least),
+                gap: density(unknown.log, open.stay_in_gap(step_m)),
+                open: density(least, open.stay_beyond(step_m)),
             };
             Some((*of, density))
         });
@@ -97,7 +101,7 @@ impl Unexplored {
             };
             let ways = (open.entries().len() * rotations.len()).max(1) as f64;
             let step_m = (contact.position_m - last.position_m).norm();
-            let enters = (1.0 - open.stay(step_m)).max(ENTER_MIN);
+            let enters = (1.0 - open.stay_beyond(step_m)).max(ENTER_MIN);
             let each = log + bare + enters.ln() - ways.ln();
             for entry in open.entries() {
                 let place = &indexed.places[*entry as usize];
@@ -113,7 +117,10 @@ impl Unexplored {
                         translation: place.position.coords - turn * contact.position_m.coords,
                         variance_m2: contact.variance_m2() + place.variance_m2 + open.entry_m2(),
                         evidence,
-                        falls: Falls::default(),
+                        falls: Falls {
+                            beyond: 1.0,
+                            ..Falls::default()
+                        },
                     });
                 }
             }
@@ -133,7 +140,7 @@ impl Unexplored {
             let density = densities.get(of).copied().unwrap_or_default();
             *log += density.open.ln();
         }
-        if self.history.len() <= PREFILTER_CONTACTS_MAX {
+        if self.history.len() < CONTACTS_MAX {
             self.history.push(densities);
         }
     }
