@@ -15,7 +15,7 @@ use crate::model::{ModelPlace, ObjectModel};
 use crate::numeric::{centroid, floor_u32};
 use crate::surfels::map::SurfelMap;
 
-use crate::tuning::{FIELD_PER_SPACING, NODE_STEP, SHARE_BINS, SHARE_SAMPLES};
+use crate::tuning::{FIELD_PER_SPACING, JOINT_CHANNELS, NODE_STEP, SHARE_BINS, SHARE_SAMPLES};
 
 /// A model ready for recognition: its places, their indexes, and the share of them within a
 /// distance.
@@ -151,7 +151,7 @@ impl IndexedModel {
             plane: plane_normal(felt).filter(|_| graph.is_curve()),
             between_sd_m: between_sd_m(&places),
             missed_share: (spread == Spread::OnPlaces).then(|| missed_share(model.places())),
-            level_processes: processes.collect(),
+            level_processes: processes.take(JOINT_CHANNELS).collect(),
             own_levels,
             body: body.cloned(),
             chosen_log,

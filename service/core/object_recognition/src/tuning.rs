@@ -109,6 +109,8 @@ pub(crate) const APART_MIN: f64 = 1e-3;
 pub(crate) const JOINT_CONTACTS: usize = 64;
 /// Fewer of them tell nothing. Chosen.
 pub(crate) const JOINT_CONTACTS_MIN: usize = 8;
+/// Channels of a model whose levels are told so, the first ones. Budget.
+pub(crate) const JOINT_CHANNELS: usize = 4;
 /// Deviations from what is predicted beyond which a contact or a level is another's. Chosen.
 pub(crate) const JOINT_SDS: f64 = 4.0;
 /// Share of the variance of what is predicted across a surface that is common within a gap alone

@@ -35,6 +35,8 @@ struct ProcessForm {
     roughness: f64,
     /// How far that is common \[m\].
     rough_m: f64,
+    /// How far places lie from one another \[m\].
+    gap_m: f64,
     /// Variance of the noise of a level, at least.
     noise: f64,
 }
@@ -104,6 +106,7 @@ impl ProcessForm {
                         length_m,
                         roughness: roughness.max(PROCESS_ROUGHNESS_MIN),
                         rough_m: gap_m,
+                        gap_m,
                         noise: PROCESS_NUGGET * variance,
                     };
                     best = Some((log, own));
@@ -121,7 +124,8 @@ impl LevelProcess {
             let own = place.levels.iter().find(|own| own.channel == channel)?;
             Some((place.position_m, own.mean, own.variance()))
         };
-        let levels: Vec<_> = places.iter().filter_map(level).collect();
+        let levels = places.iter().filter_map(level);
+        let levels: Vec<_> = levels.filter(|own| own.2.is_finite()).collect();
         if levels.len() < BETWEEN_MIN || gap_m <= 0.0 {
             return None;
         }
@@ -155,9 +159,17 @@ impl LevelProcess {
         levels: &[PlacedLevel],
         prior: (f64, f64),
     ) -> Option<f64> {
-        // The form by which the levels are likeliest, whatever they are of.
+        // The form by which the usual levels are likeliest, whatever they are of.
+        let usual: Vec<PlacedLevel> = { levels.iter() }
+            .filter(|own| {
+                self.forms
+                    .first()
+                    .is_some_and(|form| form.is_usual(own, prior))
+            })
+            .copied()
+            .collect();
         let logs =
-            { self.forms.iter() }.filter_map(|own| Some((own, own.other_log(levels, prior)?)));
+            { self.forms.iter() }.filter_map(|own| Some((own, own.other_log(&usual, prior)?)));
         let best = logs.max_by(|a, b| a.1.total_cmp(&b.1));
         best?.0.log_factor(&self.positions, levels, prior)
     }
@@ -182,6 +194,12 @@ impl LearnedLevels {
             factor,
             weights,
         })
+    }
+
+    /// Whether a level may be one of another object, whose mean has this mean and variance.
+    fn is_usual(&self, level: &PlacedLevel, (mean, variance): (f64, f64)) -> bool {
+        let variance = self.form.covariance(0.0) + f64::max(variance, self.form.variance);
+        (level.level - mean).powi(2) <= JOINT_SDS.powi(2) * (variance + level.sd * level.sd)
     }
 
     /// Log density of levels of another object, whose mean has this mean and variance.
@@ -220,7 +238,7 @@ impl LearnedLevels {
             |number: &usize| off(*number).powi(2) <= JOINT_SDS.powi(2) * known(*number, *number);
         let (usual, wrong): (Vec<usize>, Vec<usize>) = (0..levels.len()).partition(is_usual);
         let wrong: Vec<_> = wrong.iter().map(|number| levels[*number].at).collect();
-        let wrong = independent(&wrong, form.rough_m) * WRONG_PERCEPT_SHARE.ln();
+        let wrong = independent(&wrong, form.gap_m) * WRONG_PERCEPT_SHARE.ln();
         let factor = factor(usual.len(), |row, column| known(usual[row], usual[column]))?;
         let off = DVector::from_iterator(usual.len(), usual.iter().map(|own| off(*own)));
         let usual: Vec<PlacedLevel> = usual.iter().map(|own| levels[*own]).collect();

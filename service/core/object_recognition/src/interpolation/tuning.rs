@@ -82,7 +82,7 @@ pub(super) const PROCESS_ROUGH_LENGTHS: [f64; 3] = [1.0, 0.3, 0.1];
 /// Least variance of a level's noise, per that of the process. Chosen.
 pub(super) const PROCESS_NUGGET: f64 = 1e-3;
 /// Places by which such a process predicts. Budget.
-pub(super) const PROCESS_PLACES: usize = 256;
+pub(super) const PROCESS_PLACES: usize = 96;
 /// Fewer places tell nothing of what lies between and beyond them: of twenty contacts some fall on
 /// one place. Chosen.
 pub(super) const BETWEEN_MIN: usize = 16;

@@ -11,8 +11,8 @@ use crate::indexed_place::Prediction;
 use crate::interpolation::{BodyPoint, OpenRegion, Part, PlacedLevel};
 use crate::level_prior::LevelPrior;
 use crate::tuning::{
-    ERROR_REACH, JOINT_CONTACTS, JOINT_CONTACTS_MIN, JOINT_SDS, LOCAL_ERROR_SHARE, POSE_PRIOR_M,
-    SHAPE_REACH, SHAPE_SD, WRONG_PERCEPT_SHARE,
+    ERROR_REACH, JOINT_CONTACTS, JOINT_CONTACTS_MIN, JOINT_SDS, LEVEL_MAX, LOCAL_ERROR_SHARE,
+    POSE_PRIOR_M, SHAPE_REACH, SHAPE_SD, WRONG_PERCEPT_SHARE,
 };
 
 /// How far a contact is off the surface that a model predicts, along one direction across it.
@@ -61,7 +61,11 @@ pub(super) fn log_bayes_factor(
     let surface = surface_factor(indexed, map_from_episode, &chosen)?;
     let levels = indexed.level_processes.iter().filter_map(|process| {
         let level = |contact: &&Contact| {
+            // A level of which nothing is known tells nothing.
             let reading = contact.level(process.channel)?;
+            if reading.sd > LEVEL_MAX {
+                return None;
+            }
             Some(PlacedLevel {
                 at: map_from_episode * contact.position_m,
                 level: reading.value,
@@ -72,7 +76,7 @@ pub(super) fn log_bayes_factor(
         let usual = LevelPrior::of(level_prior, process.channel)?.usual();
         process.log_bayes_factor(&levels, usual)
     });
-    Some(surface + levels.sum::<f64>())
+    Some(surface + levels.sum::<f64>()).filter(|log| log.is_finite())
 }
 
 /// The part of the surface.
@@ -158,8 +162,10 @@ impl SurfaceOffset {
             }
             (WholeError::Around(own_m), WholeError::Around(other_m)) => {
                 let shape_m2 = (SHAPE_SD * indexed.extent_m).powi(2);
-                let variance_m2 = if is_known { own_m * other_m } else { shape_m2 };
-                common * variance_m2 * matern(apart_m / (SHAPE_REACH * indexed.extent_m))
+                let apart_m2 = if is_known { 0.0 } else { shape_m2 };
+                common
+                    * (own_m * other_m + apart_m2)
+                    * matern(apart_m / (SHAPE_REACH * indexed.extent_m))
             }
             _ => 0.0,
         };

@@ -38,9 +38,11 @@ impl GaussianSum {
         }
         let mut other = Self::new(self.rotations.clone());
         other.begin(library, first, BTreeMap::new(), &holds);
+        other.settle();
         for (number, contact) in order.iter().enumerate().skip(1) {
             let before = &order[..number];
             other.touch(library, before, contact, BTreeMap::new(), &|_| 0.0, None);
+            other.settle();
         }
         let found = self.lost(other.all);
         if !found.is_empty() {
