@@ -4,9 +4,10 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use super::plane::plane_normal;
 use super::tuning::{
-    DENSE_LINK, END_LINKS, LINK_BALL, LINK_LENGTH_MAX, LINK_NEIGHBOURS, OPEN_CURVE_COS,
-    OPEN_SURFACE_RAD, RIM_MIN,
+    CHORD_CHAIN, CHORD_LINK, CHORD_PLACES, DENSE_LINK, END_LINKS, LINK_BALL, LINK_LENGTH_MAX,
+    LINK_NEIGHBOURS, OPEN_CURVE_COS, OPEN_SURFACE_RAD, RIM_MIN,
 };
 use crate::tuning::NODE_STEP;
 
@@ -14,8 +15,9 @@ use crate::tuning::NODE_STEP;
 ///
 /// Two places are linked if a ball about the middle of their segment holds no other place (a
 /// β-skeleton, Kirkpatrick and Radke 1985, with β below one): a closed polygon along a curve, a
-/// triangulation with few holes on a surface. Links that are much longer than the typical one are
-/// none: what lies across was not explored.
+/// triangulation with few holes on a surface. A chord of a curve, or of an outline in a plane, is
+/// none: a chain of much shorter links leads about it. Nor is a link that is much longer than the
+/// typical one: what lies across was not explored.
 #[derive(Clone, Debug)]
 pub(crate) struct LinkGraph {
     /// The places linked to each, in ascending order.
@@ -42,6 +44,12 @@ impl LinkGraph {
             .map(|(own, near)| linked(positions, own, near))
             .collect();
         symmetrise(&mut links);
+        let without = without_chords(positions, &links);
+        // What lies in a plane is an outline, across which nothing lies.
+        let is_outline = || plane_normal(positions).is_some();
+        if are_lines(without.len(), &triangles(&without)) || is_outline() {
+            links = without;
+        }
         let lengths = |links: &[Vec<u32>]| -> Vec<f64> {
             let pairs = links.iter().enumerate();
             pairs
@@ -80,7 +88,7 @@ impl LinkGraph {
 
     /// Whether the places lie along lines, for the most part.
     pub(crate) fn is_curve(&self) -> bool {
-        2 * self.triangles.len() < self.links.len()
+        are_lines(self.links.len(), &self.triangles)
     }
 
     /// Whether a contact between two places is beside one of them anyway.
@@ -230,6 +238,62 @@ fn symmetrise(links: &mut [Vec<u32>]) {
     }
 }
 
+/// Whether so many places with these triangles lie along lines, for the most part.
+fn are_lines(places: usize, triangles: &[[u32; 3]]) -> bool {
+    2 * triangles.len() < places
+}
+
+/// The links without those that a chain of others leads about: each of them at most [`CHORD_LINK`]
+/// as long, and all together at most [`CHORD_CHAIN`], by no more than [`CHORD_PLACES`].
+fn without_chords(positions: &[Point3<f64>], links: &[Vec<u32>]) -> Vec<Vec<u32>> {
+    let apart_m = |own: usize, other: usize| (positions[own] - positions[other]).norm();
+    let shortest_m: Vec<f64> = { links.iter().enumerate() }
+        .map(|(own, others)| {
+            let lengths = others.iter().map(|other| apart_m(own, *other as usize));
+            lengths.fold(f64::INFINITY, f64::min)
+        })
+        .collect();
+    let is_chord = |one: usize, two: usize| {
+        // The same from both ends.
+        let (own, other) = (one.min(two), one.max(two));
+        let length_m = apart_m(own, other);
+        let link_m = CHORD_LINK * length_m;
+        if shortest_m[own].max(shortest_m[other]) > link_m {
+            return false;
+        }
+        let most_m = CHORD_CHAIN * length_m;
+        // Ways from the one end, the shortest first (Dijkstra 1959).
+        let mut ways = vec![(0.0_f64, own)];
+        let mut met = vec![own];
+        while let Some(next) = (0..ways.len()).min_by(|a, b| ways[*a].0.total_cmp(&ways[*b].0)) {
+            let (way_m, at) = ways.swap_remove(next);
+            if at == other {
+                return true;
+            }
+            if at != own && met.contains(&at) {
+                continue;
+            }
+            met.push(at);
+            if met.len() > CHORD_PLACES {
+                return false;
+            }
+            for step in links[at].iter().map(|step| *step as usize) {
+                let step_m = apart_m(at, step);
+                let all_m = way_m + step_m;
+                if step_m <= link_m && all_m + apart_m(step, other) <= most_m {
+                    ways.push((all_m, step));
+                }
+            }
+        }
+        false
+    };
+    let kept = links.iter().enumerate().map(|(own, others)| {
+        let kept = { others.iter() }.filter(|other| !is_chord(own, **other as usize));
+        kept.copied().collect()
+    });
+    kept.collect()
+}
+
 fn triangles(links: &[Vec<u32>]) -> Vec<[u32; 3]> {
     let mut triangles = Vec::new();
     for (own, others) in (0u32..).zip(links) {
@@ -249,4 +313,58 @@ fn triangles(links: &[Vec<u32>]) -> Vec<[u32; 3]> {
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// So many places about a ring, each off it by up to 1 mm.
+    fn ring(count: u32, radius_m: f64) -> Vec<Point3<f64>> {
+        let off = |k, axis| 0.002 * (random::uniform(21, [k, axis, 0]) - 0.5);
+        let place = |k: u32| {
+            let (sin, cos) = (TAU * f64::from(k) / f64::from(count)).sin_cos();
+            let k = u64::from(k);
+            Point3::new(
+                radius_m * cos + off(k, 0),
+                radius_m * sin + off(k, 1),
+                off(k, 2),
+            )
+        };
+        (0..count).map(place).collect()
+    }
+
+    #[test]
+    fn places_of_a_ring_are_linked_to_their_neighbours_alone() {
+        for count in [5, 6, 7, 8, 12, 16, 18, 20, 24, 40] {
+            let places = ring(count, 0.06);
+            let graph = LinkGraph::new(&places);
+            assert!(graph.links.iter().all(|own| own.len() == 2), "{count}");
+            let step_m = 0.12 * (std::f64::consts::PI / f64::from(count)).sin();
+            let off = graph.typical_m / step_m;
+            assert!((0.9..1.1).contains(&off), "{count}: {off}");
+            assert!(graph.is_curve(), "{count}");
+        }
+    }
+
+    #[test]
+    fn no_link_leads_through_a_ball() {
+        for count in [24_u32, 40, 80, 200] {
+            let golden = TAU * 0.618_033_988_749_895;
+            let place = |k: u32| {
+                let z = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(count);
+                let (sin, cos) = (golden * f64::from(k)).sin_cos();
+                let across = (1.0 - z * z).sqrt();
+                Point3::new(across * cos, across * sin, z)
+            };
+            let places: Vec<Point3<f64>> = (0..count).map(place).collect();
+            let graph = LinkGraph::new(&places);
+            assert!(!graph.is_curve(), "{count}");
+            assert!(graph.longest_m < 1.5, "{count}: {}", graph.longest_m);
+            // A closed triangulation has three links for each place, and a diagonal of some faces.
+            let links = graph.links.iter().map(Vec::len).sum::<usize>();
+            let each = links as f64 / f64::from(count);
+            assert!((5.0..9.0).contains(&each), "{count}: {each}");
+        }
+    }
 }

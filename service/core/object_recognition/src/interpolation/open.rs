@@ -2,16 +2,16 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::Point3;
 
 use super::graph::LinkGraph;
+use super::plane::plane_normal;
 use super::spread::Spread;
 use super::tuning::{
-    BETWEEN_MIN, ENTRIES_MAX, ENTRY_REACH, EXPLORED_REACH, FLAT_SHARE, MISSING_PER_KNOWN,
-    PARTIAL_PRIOR, STAY_PER_MISSING, UNEXPECTED_SHARE, UNEXPLORED_MIN,
+    BETWEEN_MIN, ENTRIES_MAX, ENTRY_REACH, EXPLORED_REACH, MISSING_PER_KNOWN, PARTIAL_PRIOR,
+    STAY_PER_MISSING, UNEXPECTED_SHARE, UNEXPLORED_MIN,
 };
 use crate::index::nearest_place::NearestPlace;
-use crate::numeric::centroid;
 use crate::tuning::{EVEN_SHARE_MIN, FIELD_PER_SPACING, NODE_STEP};
 
 /// The part of space of which a model knows little: beyond the edge of what was felt, and in the
@@ -208,17 +208,4 @@ fn missing_m(felt: &[Point3<f64>], ends: &[u32]) -> f64 {
     };
     let gaps = ends.iter().map(gap).filter(|gap| gap.is_finite());
     0.5 * gaps.sum::<f64>()
-}
-
-/// The normal of the plane in which all places lie, if they do.
-pub(crate) fn plane_normal(felt: &[Point3<f64>]) -> Option<Vector3<f64>> {
-    let middle = centroid(felt.iter().map(|position| position.coords));
-    let spread = felt.iter().map(|position| {
-        let apart = position.coords - middle;
-        apart * apart.transpose()
-    });
-    let axes = spread.sum::<Matrix3<f64>>().symmetric_eigen();
-    let (least, value) = axes.eigenvalues.argmin();
-    let is_flat = value < FLAT_SHARE * axes.eigenvalues.max();
-    is_flat.then(|| axes.eigenvectors.column(least).into_owned())
 }

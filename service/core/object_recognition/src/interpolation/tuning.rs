@@ -7,6 +7,13 @@ pub(super) const LINK_NEIGHBOURS: usize = 16;
 /// below one, so that few faces of a surface are without a diagonal. A curve that turns by less
 /// than 74° at a place has no link past it. Chosen.
 pub(super) const LINK_BALL: f64 = 0.75;
+/// Longest link of a chain that leads about a chord, per length of that: half, as of a hexagon.
+/// Chosen.
+pub(super) const CHORD_LINK: f64 = 0.55;
+/// Longest such chain, per length of the chord: half a circle, and a little. Chosen.
+pub(super) const CHORD_CHAIN: f64 = 1.7;
+/// Places that are tried for it. Budget.
+pub(super) const CHORD_PLACES: usize = 256;
 /// Longest link, per typical one: beyond, nothing was explored. Gaps between places that are drawn
 /// at random all over a surface are rarely longer. Chosen.
 pub(super) const LINK_LENGTH_MAX: f64 = 4.0;

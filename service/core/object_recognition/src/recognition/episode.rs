@@ -170,7 +170,7 @@ impl Recognition {
                 .fold(f64::NEG_INFINITY, f64::max);
             match &self.hypotheses {
                 Hypotheses::Translations(translations) => {
-                    none += self.earned(library, &objects, translations);
+                    none += self.counted(library, &mut objects, translations);
                 }
                 Hypotheses::Poses(_) => {
                     let any = none + evidence_share * self.unknown_pose_log(library);

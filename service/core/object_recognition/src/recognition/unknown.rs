@@ -21,6 +21,27 @@ use crate::tuning::{
 };
 use crate::variant::VariantId;
 
+/// By how much an unknown object is likelier than a known one \[nats\].
+#[derive(Clone, Copy, Debug)]
+struct UnknownLead {
+    /// Whether all contacts tell it together.
+    is_joint: bool,
+    lead: f64,
+    /// As it counts where the unknown object leads.
+    earned: f64,
+}
+
+impl UnknownLead {
+    /// That one contact after the other tells.
+    fn of_each(lead: f64) -> Self {
+        Self {
+            is_joint: false,
+            lead,
+            earned: lead,
+        }
+    }
+}
+
 impl Recognition {
     /// Probability that the right pose in a learned model is not among the hypotheses. The contacts
     /// are then as much like that model as like an unknown object.
@@ -69,40 +90,57 @@ impl Recognition {
         -(self.aimed as f64) * library.extent_m().max(1e-6).ln()
     }
 
-    /// Log-likelihood of an unknown object, as it counts, in the measure of translations.
+    /// Log-likelihood of an unknown object, as it counts, in the measure of translations; those of
+    /// the likeliest known ones become what all contacts together tell of them.
+    ///
+    /// Contacts that share errors tell the same again and again, so that the sums over one after
+    /// the other are too sure of one known object against another, too. Of two of which either one
+    /// predicts what lies between its places, the odds are those of both against the unknown one.
     ///
     /// Over the best one an unknown object leads by the least of its leads over the likeliest, but
-    /// keeps the odds of [`doubt`] where it leads over the best one. The odds between known objects
-    /// stay as they are.
-    pub(super) fn earned(
+    /// keeps the odds of [`doubt`] where it leads over the best one.
+    pub(super) fn counted(
         &self,
         library: &ObjectLibrary,
-        objects: &[(ObjectId, f64)],
+        objects: &mut [(ObjectId, f64)],
         translations: &GaussianSum,
     ) -> f64 {
         let unknown = self.background_logs(library, translations);
-        let mut likeliest: Vec<_> = objects.iter().filter(|own| own.1.is_finite()).collect();
-        likeliest.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let Some(&best) = likeliest.first() else {
-            return unknown.log();
-        };
+        objects.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let doubt = doubt(objects.len());
         let logs = translations.variant_logs();
         let lead = |&(object, log): &(ObjectId, f64)| {
             let leads = unknown.plus(-log);
-            self.earned_lead(library, translations, object, (&logs, leads, doubt))
+            let lead = self.unknown_lead(library, translations, object, (&logs, leads, doubt));
+            lead.filter(|_| log.is_finite())
         };
-        let earned = lead(best).unwrap_or(unknown.log() - best.1);
-        if earned <= 0.0 {
-            return best.1 + earned;
+        let leads = objects.iter().take(EARNED_MAX).map(lead);
+        let leads: Vec<Option<UnknownLead>> = leads.collect();
+        let Some((&(_, best_log), best)) = objects.first().zip(leads.first()) else {
+            return unknown.log();
+        };
+        let Some(best) = best else {
+            return unknown.log();
+        };
+        let mut likeliest = (best_log, best.earned);
+        for ((_, log), own) in objects.iter_mut().zip(leads.iter().flatten()) {
+            if own.is_joint || best.is_joint {
+                *log = best_log + best.lead - own.lead;
+            }
+            if *log > likeliest.0 {
+                likeliest = (*log, own.earned);
+            }
         }
-        let others = likeliest.into_iter().take(EARNED_MAX).skip(1);
-        let leads = others.filter_map(lead);
-        best.1 + leads.fold(earned, f64::min).max(earned.min(doubt))
+        let (log, earned) = likeliest;
+        if earned <= 0.0 {
+            return log + earned;
+        }
+        let leads = leads.iter().flatten().map(|own| own.earned);
+        log + leads.fold(earned, f64::min).max(earned.min(doubt))
     }
 
-    /// The lead of an unknown object over a known one, as it counts; none where that has no
-    /// hypothesis left. `leads` are those by all contacts, `logs` the masses of the variants.
+    /// The lead of an unknown object over a known one; none where that has no hypothesis left.
+    /// `leads` are those by all contacts, `logs` the masses of the variants.
     ///
     /// Contacts in one gap of a model share its errors, so that one after the other they tell the
     /// same again and again. Where a model predicts what lies between its places, the known object
@@ -121,13 +159,13 @@ impl Recognition {
     /// Where neighbouring places tell nothing of what lies between, contacts there call nothing
     /// unknown either: see [`Self::told_by_outliers`]. They leave the unknown object ahead, in
     /// doubt.
-    fn earned_lead(
+    fn unknown_lead(
         &self,
         library: &ObjectLibrary,
         translations: &GaussianSum,
         object: ObjectId,
         (logs, leads, doubt): (&BTreeMap<VariantId, f64>, UnknownLogs, f64),
-    ) -> Option<f64> {
+    ) -> Option<UnknownLead> {
         let id = heavier(logs, object);
         let indexed = library.variant(id)?;
         let lead = leads.log();
@@ -136,7 +174,7 @@ impl Recognition {
             let falls = heaviest().map(|own| own.falls).unwrap_or_default();
             let told = told_by_gaps(falls, missed_share);
             let most = if told > 0.0 { lead.max(0.0) } else { lead };
-            return Some((lead + told).min(most));
+            return Some(UnknownLead::of_each((lead + told).min(most)));
         }
         let pose = || Some(heaviest()?.pose(&translations.rotations));
         if let Some(gaps) = indexed.gaps.as_ref().filter(|_| lead > doubt) {
@@ -144,23 +182,30 @@ impl Recognition {
             let share_log = step_share_logs(library, self.reach_m());
             let outlier_log = (OUTLIER_SHARE * library.clutter_per_m3()).ln() - share_log(indexed);
             let told = self.told_by_outliers(gaps, &pose()?, outlier_log);
-            return Some(lead.min(f64::max(lead - told, doubt)));
+            let lead = lead.min(f64::max(lead - told, doubt));
+            return Some(UnknownLead::of_each(lead));
         }
         if !indexed.shares_errors() {
-            return Some(lead);
+            return Some(UnknownLead::of_each(lead));
         }
         let pose = pose()?;
         let share = |reach| evidence_share(indexed, &pose, &self.contacts, reach);
         let joint = log_bayes_factor(indexed, library.level_prior(), &pose, &self.contacts);
+        let is_joint = joint.is_some();
         let lead = joint.map_or(lead, |joint| f64::max(-joint, leads.library));
-        if lead > 0.0 {
-            return Some(f64::max(lead * share(UNKNOWN_ERROR_REACH), lead.min(doubt)));
-        }
-        if joint.is_some() {
-            return Some(lead);
-        }
-        let library = leads.library * share(ERROR_REACH);
-        Some(UnknownLogs { library, ..leads }.log().min(0.0))
+        let earned = if lead > 0.0 {
+            f64::max(lead * share(UNKNOWN_ERROR_REACH), lead.min(doubt))
+        } else if is_joint {
+            lead
+        } else {
+            let library = leads.library * share(ERROR_REACH);
+            UnknownLogs { library, ..leads }.log().min(0.0)
+        };
+        Some(UnknownLead {
+            is_joint,
+            lead,
+            earned,
+        })
     }
 
     /// By how much contacts in gaps of which nothing is predicted speak for the unknown object, if

@@ -31,7 +31,7 @@ pub(crate) struct GaussianSum {
     /// The exact hypotheses, by model, rotation and place.
     pub(super) all: Vec<TranslationHypothesis>,
     /// The seeds that were not promoted.
-    prefilter: Prefilter,
+    pub(super) prefilter: Prefilter,
     /// Episodes that were on nothing explored so far.
     pub(super) unexplored: Unexplored,
     /// Log-likelihoods of the contacts under an unknown object, without those that were asked for.

@@ -275,6 +275,23 @@ impl Prefilter {
         near.into_iter().take(most).map(|(_, seed)| seed).collect()
     }
 
+    /// Removes the seed that this hypothesis was after the first touch, if it waits. Masses are
+    /// summed up anew by [`drop_below`](Self::drop_below).
+    pub(crate) fn remove(
+        &mut self,
+        own: &TranslationHypothesis,
+        rotations: &[UnitQuaternion<f64>],
+    ) {
+        let nearest = self.nearest(own, rotations, 1);
+        let is_own = |seed: &&Seed| {
+            let other = self.hypothesis(seed, rotations);
+            other.is_some_and(|other| other.translation == own.translation)
+        };
+        if let Some(seed) = nearest.iter().find(is_own) {
+            self.groups[seed.group].weights[seed.number] = 0.0;
+        }
+    }
+
     /// Whether a seed was not taken.
     pub(crate) fn has(&self, seed: &Seed) -> bool {
         self.groups[seed.group].weights[seed.number] > 0.0

@@ -59,16 +59,16 @@ impl GaussianSum {
         let mut models: Vec<_> = self.variant_logs().into_iter().filter(shares).collect();
         models.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let mut seeds = 0;
-        let fits = |own: &(VariantId, f64)| {
+        models.retain(|own| {
             let places = library.variant(own.0).map_or(0, |own| own.places.len());
-            seeds += places * self.rotations.len();
-            seeds <= SEARCHED_SEEDS_MAX
-        };
-        models
-            .into_iter()
-            .take_while(fits)
-            .map(|own| own.0)
-            .collect()
+            let with = seeds + places * self.rotations.len();
+            let fits = with <= SEARCHED_SEEDS_MAX;
+            if fits {
+                seeds = with;
+            }
+            fits
+        });
+        models.into_iter().map(|own| own.0).collect()
     }
 
     /// The heaviest of these poses that no hypothesis holds.
@@ -76,15 +76,17 @@ impl GaussianSum {
         found.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         found.truncate(SEARCHED_POSES);
         let best = found.first().map_or(0.0, |own| own.evidence);
-        found.retain(|own| {
-            let is_held = self.all.iter().any(|other| {
-                let square = (other.translation - own.translation).norm_squared();
-                let variance_m2 = other.variance_m2 + own.variance_m2;
-                other.map() == own.map() && square < SEARCHED_SDS * SEARCHED_SDS * variance_m2
-            });
-            own.evidence > best - SEARCHED_NATS && !is_held
-        });
+        found.retain(|own| own.evidence > best - SEARCHED_NATS && !self.holds(own));
         found
+    }
+
+    /// Whether a hypothesis has about this pose.
+    fn holds(&self, own: &TranslationHypothesis) -> bool {
+        self.all.iter().any(|other| {
+            let square = (other.translation - own.translation).norm_squared();
+            let variance_m2 = other.variance_m2 + own.variance_m2;
+            other.map() == own.map() && square < SEARCHED_SDS * SEARCHED_SDS * variance_m2
+        })
     }
 
     /// Adds hypotheses by the seeds nearest to these poses, after all contacts.
@@ -109,20 +111,25 @@ impl GaussianSum {
             .collect();
         let touches: Vec<&TouchUpdate<'_>> = touches.iter().collect();
         let mut buffers = SplitBuffers::default();
-        let mut parts = self.all.clone();
+        let mut parts = Vec::new();
         for own in found {
             for seed in prefilter.nearest(own, &self.rotations, SEARCHED_SEEDS) {
                 if !prefilter.has(&seed) {
                     continue;
                 }
                 let (mut hypothesis, known) = prefilter.take(&seed, &self.rotations, &first);
+                self.prefilter.remove(&hypothesis, &self.rotations);
                 let size = self.sizes.get(&hypothesis.of());
                 hypothesis.evidence += size.copied().unwrap_or_default();
                 let rotation = &self.rotations[usize::from(hypothesis.rotation)];
                 buffers.replay(rotation, known, hypothesis, &touches, &mut parts);
             }
         }
-        self.all = merged(&parts);
+        // No mass counts twice: a seed may wait, or have been promoted before.
+        self.prefilter.drop_below(f64::NEG_INFINITY);
+        let lost = merged(&parts).into_iter().filter(|own| !self.holds(own));
+        let all: Vec<_> = self.all.iter().copied().chain(lost).collect();
+        self.all = merged(&all);
         self.prune(library);
     }
 }

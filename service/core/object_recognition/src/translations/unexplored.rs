@@ -1,6 +1,7 @@
 //! Walks over what was not explored of the objects that are known in part.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::UnitQuaternion;
 
@@ -26,7 +27,7 @@ pub(crate) struct Unexplored {
     /// Log of the mass of the episodes that were nowhere else so far.
     pub(crate) logs: BTreeMap<VariantId, f64>,
     /// Densities of the contacts after the first, as far as hypotheses may be replayed by them.
-    pub(crate) history: Vec<BTreeMap<VariantId, UnpredictedDensity>>,
+    pub(crate) history: Vec<Arc<BTreeMap<VariantId, UnpredictedDensity>>>,
 }
 
 impl Unexplored {
@@ -141,7 +142,7 @@ impl Unexplored {
             *log += density.open.ln();
         }
         if self.history.len() < CONTACTS_MAX {
-            self.history.push(densities);
+            self.history.push(Arc::new(densities));
         }
     }
 
