@@ -6,8 +6,8 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::plane::plane_normal;
 use super::tuning::{
-    CHORD_CHAIN, CHORD_LINK, CHORD_PLACES, DENSE_LINK, END_LINKS, LINK_BALL, LINK_LENGTH_MAX,
-    LINK_NEIGHBOURS, OPEN_CURVE_COS, OPEN_SURFACE_RAD, RIM_MIN,
+    CHORD_CHAIN, CHORD_LINK, CHORD_PLACES, CHORD_SHARE, DENSE_LINK, END_LINKS, LINK_BALL,
+    LINK_LENGTH_MAX, LINK_NEIGHBOURS, OPEN_CURVE_COS, OPEN_SURFACE_RAD, RIM_MIN,
 };
 use crate::tuning::NODE_STEP;
 
@@ -16,8 +16,8 @@ use crate::tuning::NODE_STEP;
 /// Two places are linked if a ball about the middle of their segment holds no other place (a
 /// β-skeleton, Kirkpatrick and Radke 1985, with β below one): a closed polygon along a curve, a
 /// triangulation with few holes on a surface. A chord of a curve, or of an outline in a plane, is
-/// none: a chain of much shorter links leads about it. Nor is a link that is much longer than the
-/// typical one: what lies across was not explored.
+/// none: a chain of much shorter links leads about it. Links across what is narrow stay. Nor is a
+/// link one that is much longer than the typical one: what lies across was not explored.
 #[derive(Clone, Debug)]
 pub(crate) struct LinkGraph {
     /// The places linked to each, in ascending order.
@@ -45,8 +45,11 @@ impl LinkGraph {
             .collect();
         symmetrise(&mut links);
         let without = without_chords(positions, &links);
-        // What lies in a plane is an outline, across which nothing lies.
-        let is_outline = || plane_normal(positions).is_some();
+        let is_outline = || {
+            let kept = without.iter().map(Vec::len).sum::<usize>() as f64;
+            let all = links.iter().map(Vec::len).sum::<usize>() as f64;
+            plane_normal(positions).is_some() && all - kept > CHORD_SHARE * all
+        };
         if are_lines(without.len(), &triangles(&without)) || is_outline() {
             links = without;
         }
@@ -246,52 +249,49 @@ fn are_lines(places: usize, triangles: &[[u32; 3]]) -> bool {
 /// The links without those that a chain of others leads about: each of them at most [`CHORD_LINK`]
 /// as long, and all together at most [`CHORD_CHAIN`], by no more than [`CHORD_PLACES`].
 fn without_chords(positions: &[Point3<f64>], links: &[Vec<u32>]) -> Vec<Vec<u32>> {
-    let apart_m = |own: usize, other: usize| (positions[own] - positions[other]).norm();
-    let shortest_m: Vec<f64> = { links.iter().enumerate() }
-        .map(|(own, others)| {
-            let lengths = others.iter().map(|other| apart_m(own, *other as usize));
-            lengths.fold(f64::INFINITY, f64::min)
-        })
-        .collect();
-    let is_chord = |one: usize, two: usize| {
-        // The same from both ends.
-        let (own, other) = (one.min(two), one.max(two));
-        let length_m = apart_m(own, other);
-        let link_m = CHORD_LINK * length_m;
-        if shortest_m[own].max(shortest_m[other]) > link_m {
+    let mut kept = links.to_vec();
+    for (own, others) in (0u32..).zip(links) {
+        for &other in others.iter().filter(|other| **other > own) {
+            if is_chord(positions, links, [own, other]) {
+                kept[own as usize].retain(|to| *to != other);
+                kept[other as usize].retain(|to| *to != own);
+            }
+        }
+    }
+    kept
+}
+
+/// Whether a chain of other links leads about one, as [`without_chords`] has it.
+fn is_chord(positions: &[Point3<f64>], links: &[Vec<u32>], [from, to]: [u32; 2]) -> bool {
+    let apart_m =
+        |own: u32, other: u32| (positions[own as usize] - positions[other as usize]).norm();
+    let length_m = apart_m(from, to);
+    let (link_m, most_m) = (CHORD_LINK * length_m, CHORD_CHAIN * length_m);
+    // Ways from the one end, the shortest first (Dijkstra 1959).
+    let mut ways = vec![(0.0_f64, from)];
+    let mut met = Vec::new();
+    while let Some(next) = (0..ways.len()).min_by(|a, b| ways[*a].0.total_cmp(&ways[*b].0)) {
+        let (way_m, at) = ways.swap_remove(next);
+        if at == to {
+            return true;
+        }
+        if met.contains(&at) {
+            continue;
+        }
+        met.push(at);
+        if met.len() > CHORD_PLACES {
             return false;
         }
-        let most_m = CHORD_CHAIN * length_m;
-        // Ways from the one end, the shortest first (Dijkstra 1959).
-        let mut ways = vec![(0.0_f64, own)];
-        let mut met = vec![own];
-        while let Some(next) = (0..ways.len()).min_by(|a, b| ways[*a].0.total_cmp(&ways[*b].0)) {
-            let (way_m, at) = ways.swap_remove(next);
-            if at == other {
-                return true;
-            }
-            if at != own && met.contains(&at) {
-                continue;
-            }
-            met.push(at);
-            if met.len() > CHORD_PLACES {
-                return false;
-            }
-            for step in links[at].iter().map(|step| *step as usize) {
-                let step_m = apart_m(at, step);
-                let all_m = way_m + step_m;
-                if step_m <= link_m && all_m + apart_m(step, other) <= most_m {
-                    ways.push((all_m, step));
-                }
+        for &step in &links[at as usize] {
+            let step_m = apart_m(at, step);
+            let all_m = way_m + step_m;
+            // A link of no length leads about nothing.
+            if step_m <= link_m && step_m < length_m && all_m + apart_m(step, to) <= most_m {
+                ways.push((all_m, step));
             }
         }
-        false
-    };
-    let kept = links.iter().enumerate().map(|(own, others)| {
-        let kept = { others.iter() }.filter(|other| !is_chord(own, **other as usize));
-        kept.copied().collect()
-    });
-    kept.collect()
+    }
+    false
 }
 
 fn triangles(links: &[Vec<u32>]) -> Vec<[u32; 3]> {
@@ -344,6 +344,26 @@ mod tests {
             let off = graph.typical_m / step_m;
             assert!((0.9..1.1).contains(&off), "{count}: {off}");
             assert!(graph.is_curve(), "{count}");
+        }
+    }
+
+    #[test]
+    fn a_plate_that_was_felt_all_over_keeps_its_links() {
+        for plate in 0..8 {
+            for count in [20, 30, 60, 120] {
+                let at = |k: u64, axis| 0.16 * random::uniform(22, [plate, k, axis]);
+                let place = |k: u64| Point3::new(at(k, 0), at(k, 1), 0.0);
+                let places: Vec<Point3<f64>> = (0..count).map(place).collect();
+                let graph = LinkGraph::new(&places);
+                let linked = |(own, near): (usize, &Vec<u32>)| linked(&places, own, near);
+                let mut all: Vec<Vec<u32>> = graph.near.iter().enumerate().map(linked).collect();
+                symmetrise(&mut all);
+                // But for links that are too long.
+                let count_of = |links: &[Vec<u32>]| links.iter().map(Vec::len).sum::<usize>();
+                let (kept, all) = (count_of(&graph.links), count_of(&all));
+                assert!(100 * kept >= 98 * all, "{plate}, {count}: {kept} of {all}");
+                assert!(!graph.is_curve(), "{plate}, {count}");
+            }
         }
     }
 

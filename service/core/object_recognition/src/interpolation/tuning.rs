@@ -12,7 +12,10 @@ pub(super) const LINK_BALL: f64 = 0.75;
 pub(super) const CHORD_LINK: f64 = 0.55;
 /// Longest such chain, per length of the chord: half a circle, and a little. Chosen.
 pub(super) const CHORD_CHAIN: f64 = 1.7;
-/// Places that are tried for it. Budget.
+/// Share of the links in a plane that are chords where places lie about an outline. Of places all
+/// over a plate they are a fortieth, and a ninth of a few. Chosen.
+pub(super) const CHORD_SHARE: f64 = 0.15;
+/// Places that are tried for a chain. Budget.
 pub(super) const CHORD_PLACES: usize = 256;
 /// Longest link, per typical one: beyond, nothing was explored. Gaps between places that are drawn
 /// at random all over a surface are rarely longer. Chosen.

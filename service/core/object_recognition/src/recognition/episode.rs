@@ -243,6 +243,9 @@ impl Recognition {
             return None;
         }
         let mut objects = self.object_logs(library);
+        if let Hypotheses::Translations(translations) = &self.hypotheses {
+            self.counted(library, &mut objects, translations);
+        }
         objects.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let all = log_sum(objects.iter().map(|object| object.1));
         let mut rivals = Vec::new();

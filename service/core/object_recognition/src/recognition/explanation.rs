@@ -56,7 +56,7 @@ fn explored(model: &ObjectModel, pose: &PoseEstimate, contacts: &[Contact]) -> f
 }
 
 /// How much each contact speaks for the first of two objects against the second, given those before
-/// it \[nats\]. The sum is the log ratio of their evidence.
+/// it \[nats\]. The sum is the log ratio of their evidence, one contact after the other.
 fn said_for(
     library: &ObjectLibrary,
     orientation: &Orientation,

@@ -24,20 +24,18 @@ use crate::variant::VariantId;
 /// By how much an unknown object is likelier than a known one \[nats\].
 #[derive(Clone, Copy, Debug)]
 struct UnknownLead {
-    /// Whether all contacts tell it together.
-    is_joint: bool,
-    lead: f64,
     /// As it counts where the unknown object leads.
     earned: f64,
+    /// That all contacts tell together; none where they do not.
+    joint: Option<f64>,
 }
 
 impl UnknownLead {
     /// That one contact after the other tells.
-    fn of_each(lead: f64) -> Self {
+    fn of_each(earned: f64) -> Self {
         Self {
-            is_joint: false,
-            lead,
-            earned: lead,
+            earned,
+            joint: None,
         }
     }
 }
@@ -90,12 +88,14 @@ impl Recognition {
         -(self.aimed as f64) * library.extent_m().max(1e-6).ln()
     }
 
-    /// Log-likelihood of an unknown object, as it counts, in the measure of translations; those of
-    /// the likeliest known ones become what all contacts together tell of them.
+    /// Log-likelihood of an unknown object, as it counts, in the measure of translations. The odds
+    /// of the likeliest known ones become those that all contacts together tell, and objects are
+    /// sorted by what they were before.
     ///
     /// Contacts that share errors tell the same again and again, so that the sums over one after
-    /// the other are too sure of one known object against another, too. Of two of which either one
-    /// predicts what lies between its places, the odds are those of both against the unknown one.
+    /// the other are too sure of one known object against another, too. Two objects that both
+    /// predict what lies between their places have the odds that both have against the unknown one,
+    /// by all contacts together. All other odds stay as they are.
     ///
     /// Over the best one an unknown object leads by the least of its leads over the likeliest, but
     /// keeps the odds of [`doubt`] where it leads over the best one.
@@ -114,24 +114,27 @@ impl Recognition {
             let lead = self.unknown_lead(library, translations, object, (&logs, leads, doubt));
             lead.filter(|_| log.is_finite())
         };
-        let leads = objects.iter().take(EARNED_MAX).map(lead);
-        let leads: Vec<Option<UnknownLead>> = leads.collect();
-        let Some((&(_, best_log), best)) = objects.first().zip(leads.first()) else {
+        let likeliest = objects.iter().take(EARNED_MAX);
+        let leads: Vec<Option<UnknownLead>> = likeliest.map(lead).collect();
+        let first = objects.first().filter(|own| own.1.is_finite());
+        let Some(&(_, first_log)) = first else {
             return unknown.log();
         };
-        let Some(best) = best else {
-            return unknown.log();
-        };
-        let mut likeliest = (best_log, best.earned);
-        for ((_, log), own) in objects.iter_mut().zip(leads.iter().flatten()) {
-            if own.is_joint || best.is_joint {
-                *log = best_log + best.lead - own.lead;
+        let first = leads.first().copied().flatten();
+        let first = first.unwrap_or(UnknownLead::of_each(unknown.log() - first_log));
+        let mut best = (first_log, first.earned);
+        for ((_, log), own) in objects.iter_mut().zip(&leads) {
+            let Some(own) = own else {
+                continue;
+            };
+            if let Some((first, own)) = first.joint.zip(own.joint) {
+                *log = first_log + first - own;
             }
-            if *log > likeliest.0 {
-                likeliest = (*log, own.earned);
+            if *log > best.0 {
+                best = (*log, own.earned);
             }
         }
-        let (log, earned) = likeliest;
+        let (log, earned) = best;
         if earned <= 0.0 {
             return log + earned;
         }
@@ -191,21 +194,17 @@ impl Recognition {
         let pose = pose()?;
         let share = |reach| evidence_share(indexed, &pose, &self.contacts, reach);
         let joint = log_bayes_factor(indexed, library.level_prior(), &pose, &self.contacts);
-        let is_joint = joint.is_some();
-        let lead = joint.map_or(lead, |joint| f64::max(-joint, leads.library));
+        let joint = joint.map(|joint| f64::max(-joint, leads.library));
+        let lead = joint.unwrap_or(lead);
         let earned = if lead > 0.0 {
             f64::max(lead * share(UNKNOWN_ERROR_REACH), lead.min(doubt))
-        } else if is_joint {
+        } else if joint.is_some() {
             lead
         } else {
             let library = leads.library * share(ERROR_REACH);
             UnknownLogs { library, ..leads }.log().min(0.0)
         };
-        Some(UnknownLead {
-            is_joint,
-            lead,
-            earned,
-        })
+        Some(UnknownLead { earned, joint })
     }
 
     /// By how much contacts in gaps of which nothing is predicted speak for the unknown object, if

@@ -76,17 +76,9 @@ impl GaussianSum {
         found.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         found.truncate(SEARCHED_POSES);
         let best = found.first().map_or(0.0, |own| own.evidence);
-        found.retain(|own| own.evidence > best - SEARCHED_NATS && !self.holds(own));
+        let is_held = |own: &TranslationHypothesis| self.all.iter().any(|other| near(own, other));
+        found.retain(|own| own.evidence > best - SEARCHED_NATS && !is_held(own));
         found
-    }
-
-    /// Whether a hypothesis has about this pose.
-    fn holds(&self, own: &TranslationHypothesis) -> bool {
-        self.all.iter().any(|other| {
-            let square = (other.translation - own.translation).norm_squared();
-            let variance_m2 = other.variance_m2 + own.variance_m2;
-            other.map() == own.map() && square < SEARCHED_SDS * SEARCHED_SDS * variance_m2
-        })
     }
 
     /// Adds hypotheses by the seeds nearest to these poses, after all contacts.
@@ -125,13 +117,27 @@ impl GaussianSum {
                 buffers.replay(rotation, known, hypothesis, &touches, &mut parts);
             }
         }
-        // No mass counts twice: a seed may wait, or have been promoted before.
         self.prefilter.drop_below(f64::NEG_INFINITY);
-        let lost = merged(&parts).into_iter().filter(|own| !self.holds(own));
-        let all: Vec<_> = self.all.iter().copied().chain(lost).collect();
-        self.all = merged(&all);
+        // No mass counts twice: a seed may wait, or have been promoted before. Of two at one pose
+        // the heavier one stays.
+        let mut lost = merged(&parts);
+        let is_lighter = |own: &TranslationHypothesis, others: &[TranslationHypothesis]| {
+            let mut heavier = others.iter().filter(|other| other.evidence >= own.evidence);
+            heavier.any(|other| near(own, other))
+        };
+        lost.retain(|own| !is_lighter(own, &self.all));
+        self.all.retain(|own| !is_lighter(own, &lost));
+        lost.append(&mut self.all);
+        self.all = merged(&lost);
         self.prune(library);
     }
+}
+
+/// Whether two hypotheses have about the same pose in one model.
+fn near(own: &TranslationHypothesis, other: &TranslationHypothesis) -> bool {
+    let square = (other.translation - own.translation).norm_squared();
+    let variance_m2 = other.variance_m2 + own.variance_m2;
+    other.map() == own.map() && square < SEARCHED_SDS * SEARCHED_SDS * variance_m2
 }
 
 /// So many contacts, each the farthest from those before it, as if drawn from anywhere.
