@@ -12,8 +12,8 @@ pub(super) const LINK_BALL: f64 = 0.75;
 pub(super) const CHORD_LINK: f64 = 0.55;
 /// Longest such chain, per length of the chord: half a circle, and a little. Chosen.
 pub(super) const CHORD_CHAIN: f64 = 1.7;
-/// Share of the links in a plane that are chords where places lie about an outline. Of places all
-/// over a plate they are a fortieth, and a ninth of a few. Chosen.
+/// Share of the links in a plane that are chords, above which places lie about an outline. Where
+/// they lie all over a plate it is 0.025 on average, and 0.11 at most by 20 or 30 places. Chosen.
 pub(super) const CHORD_SHARE: f64 = 0.15;
 /// Places that are tried for a chain. Budget.
 pub(super) const CHORD_PLACES: usize = 256;

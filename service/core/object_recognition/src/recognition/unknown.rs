@@ -88,14 +88,14 @@ impl Recognition {
         -(self.aimed as f64) * library.extent_m().max(1e-6).ln()
     }
 
-    /// Log-likelihood of an unknown object, as it counts, in the measure of translations. The odds
-    /// of the likeliest known ones become those that all contacts together tell, and objects are
-    /// sorted by what they were before.
+    /// Log-likelihood of an unknown object, as it counts, in the measure of translations. Sorts the
+    /// known ones by their logs, and gives the likeliest the odds that all contacts together tell.
     ///
     /// Contacts that share errors tell the same again and again, so that the sums over one after
-    /// the other are too sure of one known object against another, too. Two objects that both
-    /// predict what lies between their places have the odds that both have against the unknown one,
-    /// by all contacts together. All other odds stay as they are.
+    /// the other are too sure of one known object against another, too. If the likeliest object
+    /// predicts what lies between its places, those that do so, too, have the odds against it that
+    /// both have against the unknown one, by all contacts together. All other odds stay as they
+    /// are: those sums are in another measure.
     ///
     /// Over the best one an unknown object leads by the least of its leads over the likeliest, but
     /// keeps the odds of [`doubt`] where it leads over the best one.
