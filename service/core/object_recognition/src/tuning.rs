@@ -107,8 +107,11 @@ pub(crate) const UNKNOWN_ERROR_REACH: f64 = 1.0;
 pub(crate) const APART_MIN: f64 = 1e-3;
 /// Contacts of an episode of which is told how likely they are together, evenly chosen. Budget.
 pub(crate) const JOINT_CONTACTS: usize = 64;
-/// Fewer of them tell nothing. Chosen.
-pub(crate) const JOINT_CONTACTS_MIN: usize = 8;
+/// Fewer of them tell nothing: one contact lies on any surface. Derived.
+pub(crate) const JOINT_CONTACTS_MIN: usize = 2;
+/// Contacts from which on they tell one known object from another together: by fewer, constants
+/// that differ from model to model would. Chosen.
+pub(crate) const JOINT_ODDS_CONTACTS: usize = 8;
 /// Channels of a model whose levels are told so, the first ones. Budget.
 pub(crate) const JOINT_CHANNELS: usize = 4;
 /// Deviations from what is predicted beyond which a contact or a level is another's. Chosen.

@@ -7,8 +7,6 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// Largest deviation and spacing \[m, rad, or a channel's unit\].
 const DEVIATION_MAX: f64 = 1e6;
 
-/// Finest and coarsest spacing of places \[m\].
-const SPACING_M: std::ops::RangeInclusive<f64> = 1e-5..=1e3;
 /// Most places of an object.
 const PLACES_MAX: usize = 2048;
 
@@ -17,12 +15,15 @@ const PLACES_MAX: usize = 2048;
 pub struct Spacing(f64);
 
 impl Spacing {
+    /// Finest and coarsest spacing of places \[m\].
+    pub const RANGE_M: std::ops::RangeInclusive<f64> = 1e-5..=1e3;
+
     /// Contacts within this distance \[m\], 10 µm to 1 km, are of one place.
     ///
     /// # Errors
     /// The distance is out of range.
     pub fn new(spacing_m: f64) -> Result<Self, InvalidSample> {
-        if SPACING_M.contains(&spacing_m) {
+        if Self::RANGE_M.contains(&spacing_m) {
             Ok(Self(spacing_m))
         } else {
             Err(InvalidSample::NumberOutOfRange)

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::{Point3, SMatrix, SVector, Vector3};
 
 use super::body_fit::{BodyFit, Candidate};
-use super::graph::{LinkGraph, median};
+use super::graph::LinkGraph;
 use super::superellipsoid::{PARAMETERS, PARAMETERS_OF_FORM, Superellipsoid};
 use super::tails;
 use super::taken::Taken;
@@ -16,6 +16,7 @@ use super::tuning::{
     UNEXPECTED_SHARE,
 };
 use crate::model::ModelPlace;
+use crate::numeric::median;
 
 /// A superellipsoid through the places of a model, and how well it is known.
 #[derive(Clone, Debug)]

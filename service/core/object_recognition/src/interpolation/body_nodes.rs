@@ -50,6 +50,7 @@ pub(super) fn on_body(
             middle: at,
             axes: sides::along(&across),
             of: Vec::new(),
+            row: None,
         };
         let near = near(&site, places);
         let levels = fields.levels_around(&site, &near, places);

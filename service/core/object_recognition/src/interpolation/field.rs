@@ -2,14 +2,17 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::graph::{LinkGraph, median};
+use super::graph::LinkGraph;
 use super::kriging::{Kriging, Weights};
+use super::row::Row;
 use super::tails;
 use super::tuning::{
     ERROR_NEIGHBOURS, FIELD_LENGTHS, FIELD_NOISES, FIELD_SAMPLES, KRIGING_CURVE, KRIGING_SURFACE,
+    SAME_SDS,
 };
 use crate::indexed_place::Across;
 use crate::model::{LevelMemory, ModelPlace};
+use crate::numeric::median;
 use crate::tuning::SHRINKAGE;
 
 /// What varies over a surface.
@@ -45,6 +48,8 @@ pub(super) struct Site {
     pub(super) axes: Vec<Vector3<f64>>,
     /// Places on whose side of the surface it lies; none of a curve.
     pub(super) of: Vec<u32>,
+    /// The places before and after it along a curve, by which places are predicted.
+    pub(super) row: Option<Row>,
 }
 
 /// A place that is predicted by the others.
@@ -72,6 +77,14 @@ impl Site {
         let offset = point - self.middle;
         let along = self.axes.iter().map(|axis| axis * axis.dot(&offset));
         self.middle + along.sum::<Vector3<f64>>()
+    }
+
+    /// Where a point lies among the places by which one is predicted.
+    fn coordinate(&self, point: &Point3<f64>) -> Vector3<f64> {
+        match &self.row {
+            Some(_) => Vector3::x() * self.axes[0].dot(&(point - self.middle)),
+            None => self.below(point).coords,
+        }
     }
 
     /// Places by which a field is predicted here.
@@ -146,11 +159,15 @@ impl Field {
     /// How much the places around tell of what is felt at a place \[nats\], over all places.
     ///
     /// If they leave the share s of the variance of n levels open, the log-likelihood ratio of
-    /// Gaussian levels that follow from them to independent ones is −n/2 ln s.
+    /// Gaussian levels that follow from them to independent ones is −n/2 ln s. Levels that differ
+    /// by no more than their noise are the same all over, and follow anyway.
     pub(super) fn predicted_nats(&self, left_out: &[LeftOut], places: &[ModelPlace]) -> f64 {
         let FieldOf::Level(channel) = self.of else {
             return f64::INFINITY;
         };
+        if is_same_all_over(channel, places) {
+            return f64::INFINITY;
+        }
         let errors = left_out.iter().filter_map(|own| self.error(own, places));
         let (count, error) = errors.fold((0.0, 0.0), |(n, sum), (error, _)| (n + 1.0, sum + error));
         let levels = places.iter().filter_map(|place| level(place, channel));
@@ -230,26 +247,29 @@ impl Field {
             FieldOf::Place => true,
             FieldOf::Level(channel) => level(&places[*number as usize], channel).is_some(),
         };
-        let near: Vec<u32> = near
-            .iter()
-            .copied()
-            .filter(has)
-            .take(site.count())
-            .collect();
         // Places lie across the plane by what is to be predicted: it must not tell of itself.
         let over = (self.of == FieldOf::Place).then(|| site.clone());
-        let positions = near.iter().map(|number| {
-            let at = places[*number as usize].position_m;
-            over.as_ref().map_or(at, |over| over.below(&at)).coords
-        });
-        let positions = positions.collect();
+        let row = over.as_ref().and_then(|over| over.row.as_ref());
+        let (near, positions, axes): (Vec<u32>, Vec<Vector3<f64>>, _) = if let Some(row) = row {
+            let (near, along) = row.iter().unzip();
+            (near, along, &[Vector3::x()][..])
+        } else {
+            let near = near.iter().copied().filter(has).take(site.count());
+            let of = |number: u32| {
+                let at = places[number as usize].position_m;
+                let over = over.as_ref();
+                (number, over.map_or(at.coords, |over| over.coordinate(&at)))
+            };
+            let (near, positions) = near.map(of).unzip();
+            (near, positions, &site.axes[..])
+        };
         // What errs more than elsewhere, as at an edge, is less certain around (shrinkage).
         let some = near.iter().take(ERROR_NEIGHBOURS);
         let errors = some.filter_map(|number| self.errors.get(*number as usize));
         let (count, sum) = errors.fold((0.0, 0.0), |(n, sum), error| (n + 1.0, sum + error));
         let local = (sum + SHRINKAGE) / (count + SHRINKAGE);
         Some(LocalField {
-            kriging: Kriging::new(positions, &site.axes, self.length_m, self.noise)?,
+            kriging: Kriging::new(positions, axes, self.length_m, self.noise)?,
             near,
             variance: self.variance * local,
             roughness: self.roughness,
@@ -266,15 +286,25 @@ impl LocalField {
         (weights, variance)
     }
 
-    /// What is across the plane or line over which places are predicted.
-    pub(super) fn across(&self) -> Across {
-        Across::new(self.over.iter().flat_map(|over| &over.axes))
+    /// What is across the plane or line over which places are predicted; of a row, across the curve
+    /// as it leads from half a step before a point to half a step behind it.
+    pub(super) fn across(&self, at: &Point3<f64>, step_m: f64, places: &[ModelPlace]) -> Across {
+        let site = self.over.as_ref();
+        if let Some(site) = site.filter(|site| site.row.is_some()) {
+            let half_step = site.axes[0] * (0.5 * step_m);
+            let [before, after] = [at - half_step, at + half_step]
+                .map(|at| self.position(&self.weights(&at), places));
+            if let Some(along) = (after - before).try_normalize(1e-12) {
+                return Across::new([&along].into_iter());
+            }
+        }
+        Across::new(site.iter().flat_map(|site| &site.axes))
     }
 
     fn weights(&self, point: &Point3<f64>) -> Weights {
         let over = self.over.as_ref();
-        let at = over.map_or(*point, |over| over.below(point));
-        self.kriging.weights(&at.coords)
+        let at = over.map_or(point.coords, |over| over.coordinate(point));
+        self.kriging.weights(&at)
     }
 
     /// The place that is predicted.
@@ -334,8 +364,67 @@ impl LocalField {
     }
 }
 
+/// Whether the levels of places differ by no more than their noise: the squares about their mean,
+/// each per the variance of its noise, are together about as many as they (χ²).
+fn is_same_all_over(channel: u16, places: &[ModelPlace]) -> bool {
+    let levels = places.iter().filter_map(|place| {
+        let own = place.levels.iter().find(|own| own.channel == channel)?;
+        // No level is more exact than its number.
+        let least = (16.0 * f64::EPSILON * own.mean).powi(2).max(1e-60);
+        let noise = own.noise / (own.count * own.count);
+        Some((own.mean, noise.max(least).recip()))
+    });
+    let weights: f64 = levels.clone().map(|(_, weight)| weight).sum();
+    let mean = levels
+        .clone()
+        .map(|(own, weight)| own * weight)
+        .sum::<f64>()
+        / weights;
+    let squares = levels.map(|(own, weight)| (own - mean).powi(2) * weight);
+    let (n, sum) = squares.fold((0.0, 0.0), |(n, sum), square| (n + 1.0, sum + square));
+    sum <= n + SAME_SDS * f64::sqrt(2.0 * n)
+}
+
 /// Mean level of a place on a channel.
 fn level(place: &ModelPlace, channel: u16) -> Option<f64> {
     let own = place.levels.iter().find(|own| own.channel == channel);
     own.map(|own| own.mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Contact;
+    use crate::model::{ModelSettings, ObjectModel};
+
+    /// Whether so many places with these levels and deviations have the same all over.
+    fn is_same(of: impl Fn(u32) -> (f64, f64)) -> bool {
+        let mut model = ObjectModel::new(ModelSettings::default());
+        for k in 0..60 {
+            let (level, sd) = of(k);
+            let at = Point3::new(0.02 * f64::from(k), 0.0, 0.0);
+            model.learn(&Contact::at(at, 0.001).with_level(0, level, sd));
+        }
+        is_same_all_over(0, model.places())
+    }
+
+    #[test]
+    fn levels_that_differ_by_their_noise_alone_are_the_same() {
+        let normal = |k: u32| {
+            let uniform = |axis| random::uniform(41, [u64::from(k), axis, 0]);
+            (0..12).map(uniform).sum::<f64>() - 6.0
+        };
+        let of_board = |k: u32| f64::from(k % 2);
+        assert!(is_same(|_| (2.0, 0.0)));
+        assert!(is_same(|k| (2.0 + 0.1 * normal(k), 0.1)));
+        assert!(is_same(|k| (-1e6 + 0.1 * normal(k), 0.2)));
+        assert!(!is_same(|k| (2.0 + 0.2 * normal(k), 0.1)));
+        assert!(!is_same(|k| (of_board(k), 0.01)));
+        // One imprecise level says nothing of the others.
+        assert!(!is_same(|k| (
+            of_board(k),
+            if k == 0 { 10.0 } else { 0.01 }
+        )));
+        assert!(is_same(|k| if k == 0 { (9.0, 10.0) } else { (2.0, 0.01) }));
+    }
 }

@@ -3,6 +3,7 @@
 use super::body::Body;
 use super::field::{Field, FieldOf, LeftOut, LocalField, Site};
 use super::graph::LinkGraph;
+use super::neighbours::Neighbours;
 use super::sides::Sides;
 use super::spread::Spread;
 use super::tuning::{BETWEEN_MIN, BODY_NATS, KRIGING_SURFACE, NODES_MAX, PREDICTED_NATS};
@@ -17,7 +18,10 @@ pub(crate) struct Fields {
 /// What tells where the surface lies between the places.
 pub(super) enum Surface {
     /// The places around.
-    Local { place: Field, sides: Sides },
+    Local {
+        place: Field,
+        neighbours: Neighbours,
+    },
     /// A body through all of them.
     Body(Box<Body>),
 }
@@ -50,7 +54,7 @@ impl FieldVariants {
             .collect();
         channels.sort_unstable();
         channels.dedup();
-        let anywhere = Sides::none().left_out(places, graph);
+        let anywhere = Neighbours::Near.left_out(places, graph);
         let level = |channel| {
             let field = Field::learned(FieldOf::Level(channel), &anywhere, places, graph)?;
             Some((channel, field.1))
@@ -98,10 +102,10 @@ impl Fields {
         near: &[u32],
         places: &[ModelPlace],
     ) -> Option<LocalField> {
-        let Surface::Local { place, sides } = &self.surface else {
+        let Surface::Local { place, neighbours } = &self.surface else {
             return None;
         };
-        place.around(site, &sides.near(places, site, near), places)
+        place.around(site, &neighbours.of_site(places, site, near), places)
     }
 
     /// The levels about a site, by channel, as the places near it tell, nearest first.
@@ -138,18 +142,24 @@ impl Surface {
         body: Option<(f64, Body)>,
     ) -> Option<Self> {
         let (log, place) = Field::learned(FieldOf::Place, anywhere, places, graph)?;
-        // Edges are supposed where places follow better from those on their own side.
-        let edged = Sides::new(places, graph).and_then(|sides| {
-            let left_out = sides.left_out(places, graph);
+        // Edges are supposed where places follow better from those on their own side, and bends of
+        // a curve where they do from those before and after.
+        let other = if graph.is_curve() {
+            Some(Neighbours::InRow)
+        } else {
+            Sides::new(places, graph).map(Neighbours::OnSide)
+        };
+        let other = other.and_then(|neighbours| {
+            let left_out = neighbours.left_out(places, graph);
             let (own, place) = Field::learned(FieldOf::Place, &left_out, places, graph)?;
-            (own > log).then_some((own, place, sides))
+            (own > log).then_some((own, place, neighbours))
         });
-        let (log, place, sides) = edged.unwrap_or((log, place, Sides::none()));
+        let (log, place, neighbours) = other.unwrap_or((log, place, Neighbours::Near));
         let count = places.len() as f64;
         let body = body.filter(|(own, _)| count * (own - log) > BODY_NATS);
         Some(match body {
             Some((_, body)) => Self::Body(Box::new(body)),
-            None => Self::Local { place, sides },
+            None => Self::Local { place, neighbours },
         })
     }
 }

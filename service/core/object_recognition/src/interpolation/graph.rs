@@ -4,19 +4,22 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use super::outline::in_order;
 use super::plane::plane_normal;
 use super::tuning::{
-    CHORD_CHAIN, CHORD_LINK, CHORD_PLACES, CHORD_SHARE, DENSE_LINK, END_LINKS, LINK_BALL,
-    LINK_LENGTH_MAX, LINK_NEIGHBOURS, OPEN_CURVE_COS, OPEN_SURFACE_RAD, RIM_MIN,
+    BETWEEN_MIN, CHORD_CHAIN, CHORD_LINK, CHORD_PLACES, CHORD_SHARE, DENSE_LINK, END_LINKS,
+    LINK_BALL, LINK_LENGTH_MAX, LINK_NEIGHBOURS, OPEN_CURVE_COS, OPEN_SURFACE_RAD, RIM_MIN,
 };
+use crate::numeric::median;
 use crate::tuning::NODE_STEP;
 
 /// Places that neighbour one another.
 ///
 /// Two places are linked if a ball about the middle of their segment holds no other place (a
 /// β-skeleton, Kirkpatrick and Radke 1985, with β below one): a closed polygon along a curve, a
-/// triangulation with few holes on a surface. A chord of a curve, or of an outline in a plane, is
-/// none: a chain of much shorter links leads about it. Links across what is narrow stay. Nor is a
+/// triangulation with few holes on a surface. Places of an outline in a plane that are in order
+/// ([`in_order`]) are linked to the next ones alone. Elsewhere a chord of a curve is no link: a
+/// chain of much shorter links leads about it. Links across what is narrow stay there. Nor is a
 /// link one that is much longer than the typical one: what lies across was not explored.
 #[derive(Clone, Debug)]
 pub(crate) struct LinkGraph {
@@ -44,14 +47,19 @@ impl LinkGraph {
             .map(|(own, near)| linked(positions, own, near))
             .collect();
         symmetrise(&mut links);
-        let without = without_chords(positions, &links);
-        let is_outline = || {
+        let is_flat = plane_normal(positions).is_some();
+        // Few places are in order by chance.
+        let has_order = is_flat && positions.len() >= BETWEEN_MIN;
+        if let Some(outline) = has_order.then(|| in_order(positions, &near)).flatten() {
+            links = outline;
+        } else {
+            let without = without_chords(positions, &links);
             let kept = without.iter().map(Vec::len).sum::<usize>() as f64;
             let all = links.iter().map(Vec::len).sum::<usize>() as f64;
-            plane_normal(positions).is_some() && all - kept > CHORD_SHARE * all
-        };
-        if are_lines(without.len(), &triangles(&without)) || is_outline() {
-            links = without;
+            let has_chords = is_flat && all - kept > CHORD_SHARE * all;
+            if has_chords || are_lines(without.len(), &triangles(&without)) {
+                links = without;
+            }
         }
         let lengths = |links: &[Vec<u32>]| -> Vec<f64> {
             let pairs = links.iter().enumerate();
@@ -309,12 +317,6 @@ fn triangles(links: &[Vec<u32>]) -> Vec<[u32; 3]> {
     triangles
 }
 
-/// The upper median; zero of no values.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -363,6 +365,73 @@ mod tests {
                 let (kept, all) = (count_of(&graph.links), count_of(&all));
                 assert!(100 * kept >= 98 * all, "{plate}, {count}: {kept} of {all}");
                 assert!(!graph.is_curve(), "{plate}, {count}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_raster_is_no_outline() {
+        for (columns, rows) in [(4_u32, 4_u32), (5, 5), (8, 8), (15, 15), (10, 4), (20, 5)] {
+            for (apart, off_m) in [
+                (1.0, 0.0),
+                (1.0, 2e-3),
+                (1.5, 0.0),
+                (1.5, 1e-3),
+                (1.9, 1e-3),
+                (3.0, 1e-3),
+            ] {
+                let off =
+                    |k: u32, axis| off_m * (random::uniform(23, [u64::from(k), axis, 0]) - 0.5);
+                let place = |k: u32| {
+                    let (x, y) = (f64::from(k % columns), f64::from(k / columns));
+                    Point3::new(0.02 * x + off(k, 0), 0.02 * apart * y + off(k, 1), 0.0)
+                };
+                let places: Vec<Point3<f64>> = (0..columns * rows).map(place).collect();
+                let graph = LinkGraph::new(&places);
+                let about = format!("{columns} by {rows}, {apart} apart, off {off_m}");
+                assert!(!graph.is_curve(), "{about}");
+            }
+        }
+    }
+
+    #[test]
+    fn two_rings_in_a_plane_are_not_linked() {
+        for (apart_m, count) in [(0.15, 20_u32), (0.15, 24), (0.15, 30)] {
+            let mut places = ring(count, 0.06);
+            let beside = ring(count, 0.06);
+            places.extend(beside.iter().map(|at| at + Vector3::x() * apart_m));
+            let graph = LinkGraph::new(&places);
+            let is_first = |own: usize| own < count as usize;
+            for (own, links) in graph.links.iter().enumerate() {
+                let mut links = links.iter();
+                let stays = links.all(|other| is_first(*other as usize) == is_first(own));
+                assert!(stays, "{apart_m}, {count}: {own}");
+            }
+        }
+    }
+
+    #[test]
+    fn places_of_a_narrow_outline_are_linked_to_their_neighbours_alone() {
+        for (count, width) in [(20_u32, 0.5), (20, 0.33), (24, 0.25), (30, 0.2), (60, 0.1)] {
+            // The angles of places that are equally far from one another.
+            let at = |angle: f64| Point3::new(0.08 * angle.cos(), 0.08 * width * angle.sin(), 0.0);
+            let fine: Vec<Point3<f64>> =
+                (0..20_000).map(|k| at(TAU * f64::from(k) / 2e4)).collect();
+            let length_m: f64 = fine.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum();
+            let mut places = vec![fine[0]];
+            let mut way_m = 0.0;
+            for pair in fine.windows(2) {
+                way_m += (pair[1] - pair[0]).norm();
+                if way_m >= length_m * places.len() as f64 / f64::from(count) {
+                    places.push(pair[1]);
+                }
+            }
+            places.truncate(count as usize);
+            let graph = LinkGraph::new(&places);
+            for (own, links) in (0..count).zip(&graph.links) {
+                let mut expected = [own + count - 1, own + 1].map(|other| other % count);
+                expected.sort_unstable();
+                assert_eq!(links[..], expected, "{count}, {width}: {own}");
             }
         }
     }

@@ -6,7 +6,6 @@ use super::body_nodes::on_body;
 use super::field::{LocalField, Site};
 use super::fields::{Fields, Surface, near};
 use super::graph::LinkGraph;
-use super::sides::Sides;
 use super::taken::Taken;
 use super::tuning::{NODE_APART, NODE_ERROR, NODE_FIELD, NODES_GROWTH, NODES_MAX};
 use crate::indexed_place::{IndexedPlace, Prediction};
@@ -38,11 +37,11 @@ pub(crate) fn interpolated(
     if room == 0 || graph.is_dense(spacing_m) {
         return Vec::new();
     }
-    let (place, sides) = match &fields.surface {
+    let (place, neighbours) = match &fields.surface {
         Surface::Body(body) => return on_body(places, graph, (fields, body), spacing_m),
-        Surface::Local { place, sides } => (place, sides),
+        Surface::Local { place, neighbours } => (place, neighbours),
     };
-    let sites = sites(places, graph, sides);
+    let sites = neighbours.sites(places, graph);
     // Finer steps than these never fit, or say no more.
     let finest_m = f64::max(
         graph.longest_m / NODES_MAX as f64,
@@ -66,49 +65,6 @@ pub(crate) fn interpolated(
         nodes.extend(of_site.iter().map(|span| local.node(span, places, step_m)));
     }
     nodes
-}
-
-/// The segments and triangles that are bridged. A triangle over an edge is one for each side.
-fn sites(places: &[ModelPlace], graph: &LinkGraph, sides: &Sides) -> Vec<(Site, Vec<u32>)> {
-    let at = |number: u32| places[number as usize].position_m;
-    let mut sites = Vec::new();
-    for corners in &graph.triangles {
-        let groups = sides.groups(places, corners);
-        if groups.len() > 1 {
-            let of_groups = groups.iter().filter_map(|of| sides.site(places, of));
-            sites.extend(of_groups.map(|site| (site, corners.to_vec())));
-            continue;
-        }
-        let [a, b, c] = corners.map(at);
-        let along = (b - a).normalize();
-        let across = (c - a) - along * along.dot(&(c - a));
-        let Some(across) = across.try_normalize(1e-9) else {
-            continue;
-        };
-        let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
-        let axes = vec![along, across];
-        let of = corners.to_vec();
-        sites.push((Site { middle, axes, of }, corners.to_vec()));
-    }
-    for (own, links) in (0u32..).zip(&graph.links) {
-        for &other in links.iter().filter(|other| **other > own) {
-            let is_side = graph.links[other as usize]
-                .iter()
-                .any(|third| links.binary_search(third).is_ok());
-            if is_side {
-                continue;
-            }
-            let (a, b) = (at(own), at(other));
-            let middle = nalgebra::center(&a, &b);
-            let Some(along) = (b - a).try_normalize(1e-12) else {
-                continue;
-            };
-            let axes = vec![along];
-            let of = Vec::new();
-            sites.push((Site { middle, axes, of }, vec![own, other]));
-        }
-    }
-    sites
 }
 
 /// Points of all sites, no two nearer than about a step.
@@ -189,7 +145,7 @@ impl LocalFields {
             variance_m2: field_m * field_m + across_m2,
             prediction: Some(Prediction {
                 error_m: across_m2.sqrt(),
-                across: self.place.across(),
+                across: self.place.across(&span.at, step_m, places),
                 bend_m2: field_m * field_m,
             }),
             levels: self.levels.iter().filter_map(level).collect(),

@@ -21,7 +21,7 @@ type Plane = (Vector3<f64>, Unit<Vector3<f64>>);
 /// and it has the others on one side, where a plane through the body has some on either.
 #[derive(Clone, Debug)]
 pub(super) struct Sides {
-    /// Normals, with either sign where none was felt; empty where there are no edges.
+    /// Normals, with either sign where none was felt.
     normals: Vec<Option<Unit<Vector3<f64>>>>,
     /// Distance from a plane within which a place lies by it \[m\].
     reach_m: f64,
@@ -45,26 +45,13 @@ impl Sides {
         Some(sides)
     }
 
-    /// Of a surface without edges.
-    pub(super) fn none() -> Self {
-        Self {
-            normals: Vec::new(),
-            reach_m: 0.0,
-        }
-    }
-
-    /// Each place, as the others tell it.
+    /// Each place, as the others on its own side tell it.
     pub(super) fn left_out(&self, places: &[ModelPlace], graph: &LinkGraph) -> Vec<LeftOut> {
-        let of = |own: usize| {
-            let from = if self.normals.is_empty() {
-                let site = plane_or_line(own, places, graph)?;
-                vec![(site, graph.near[own].clone())]
-            } else {
-                self.about(own, places, graph)
-            };
-            Some(LeftOut { own, from })
+        let of = |own: usize| LeftOut {
+            own,
+            from: self.about(own, places, graph),
         };
-        (0..places.len()).filter_map(of).collect()
+        (0..places.len()).map(of).collect()
     }
 
     /// The sides about a place, as if it were not there.
@@ -129,6 +116,7 @@ impl Sides {
             middle: Point3::from(middle.sum::<Vector3<f64>>() / of.len() as f64),
             axes: along(&normal),
             of: of.to_vec(),
+            row: None,
         })
     }
 
@@ -258,30 +246,4 @@ fn fitted<'a>(to: impl Iterator<Item = &'a Vector3<f64>> + Clone) -> Option<Plan
     let eigen = spread.symmetric_eigen();
     let across: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();
     Some((middle, Unit::try_new(across, 1e-9)?))
-}
-
-/// The surface about a place: a plane where it has triangles, a line where it has two links.
-fn plane_or_line(own: usize, places: &[ModelPlace], graph: &LinkGraph) -> Option<Site> {
-    let middle = places[own].position_m;
-    let links = graph.links[own].iter();
-    let to: Vec<Vector3<f64>> = links
-        .map(|other| places[*other as usize].position_m - middle)
-        .collect();
-    if to.len() < 2 {
-        return None;
-    }
-    let has_triangle = graph
-        .triangles
-        .iter()
-        .any(|triangle| triangle.iter().any(|corner| *corner as usize == own));
-    let axes = if has_triangle {
-        let spread: Matrix3<f64> = to.iter().map(|to| to * to.transpose()).sum();
-        let eigen = spread.symmetric_eigen();
-        let across: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();
-        along(&Unit::new_normalize(across))
-    } else {
-        vec![Unit::try_new(to[1] - to[0], 1e-12)?.into_inner()]
-    };
-    let of = Vec::new();
-    Some(Site { middle, axes, of })
 }

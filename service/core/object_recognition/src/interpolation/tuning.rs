@@ -17,6 +17,18 @@ pub(super) const CHORD_CHAIN: f64 = 1.7;
 pub(super) const CHORD_SHARE: f64 = 0.15;
 /// Places that are tried for a chain. Budget.
 pub(super) const CHORD_PLACES: usize = 256;
+/// Longest link of an outline in a plane, per typical one: neighbours are about equally far. Of
+/// random places all over a plate it is 2.9 and more in nine of ten, by 20 places. Chosen.
+pub(super) const OUTLINE_LINK: f64 = 2.0;
+/// Places of an outline among several, at least: fewer are in order by chance. Chosen.
+pub(super) const OUTLINE_PLACES: usize = 8;
+/// Distance of places from others that are not next to them along an outline, in typical links,
+/// below which they lie side by side: as far as across a square of a raster, and no less than its
+/// longest link. Chosen.
+pub(super) const OUTLINE_BESIDE: f64 = 1.42;
+/// Share of an outline's places that lie so, at most. On rasters it is three quarters and more, of
+/// an ellipse of 5 to 1 by 20 places a fifth at most. Chosen.
+pub(super) const OUTLINE_BESIDE_SHARE: f64 = 0.25;
 /// Longest link, per typical one: beyond, nothing was explored. Gaps between places that are drawn
 /// at random all over a surface are rarely longer. Chosen.
 pub(super) const LINK_LENGTH_MAX: f64 = 4.0;
@@ -56,6 +68,10 @@ pub(super) const ENTRIES_MAX: usize = 64;
 pub(super) const KRIGING_CURVE: usize = 6;
 /// See [`KRIGING_CURVE`].
 pub(super) const KRIGING_SURFACE: usize = 12;
+/// Places to either side of a point of a curve that are in a row with it, at most. Budget.
+pub(super) const ROW_SIDE: usize = 4;
+/// Places of a row, at least: of three none tells that a curve bends. Derived.
+pub(super) const ROW_MIN: usize = 4;
 /// Neighbours of a place of which two span a plane with it. Budget.
 pub(super) const SIDE_PAIRS: usize = 8;
 /// Such planes that are fitted to the places by them, the best. Budget.
@@ -100,6 +116,9 @@ pub(super) const BETWEEN_MIN: usize = 16;
 /// that have nothing to do with them: less says little of what lies beside a place \[nats\].
 /// Chosen.
 pub(super) const PREDICTED_NATS: f64 = 10.0;
+/// Deviations by which the squares of levels that are the same all over may be above those of their
+/// noise, together. Chosen.
+pub(super) const SAME_SDS: f64 = 3.0;
 /// Degrees of freedom of the errors of a field: few are far larger than the rest. Chosen.
 pub(super) const TAILS: f64 = 4.0;
 /// By how much a body through all places must be likelier than what the places around tell, each

@@ -86,7 +86,7 @@ fn surface_factor(
     contacts: &[&Contact],
 ) -> Option<f64> {
     let mut offsets: Vec<SurfaceOffset> = Vec::with_capacity(contacts.len());
-    let mut wrong = Vec::new();
+    let (mut wrong, mut kept) = (Vec::new(), 0);
     for contact in contacts {
         let at = map_from_episode * contact.position_m;
         let is_beyond = |open: &OpenRegion| open.part(&at) == Part::Beyond;
@@ -102,11 +102,12 @@ fn surface_factor(
         if own.iter().any(is_off) {
             wrong.push(at);
         } else {
+            kept += usize::from(!own.is_empty());
             offsets.extend(own);
         }
     }
     let wrong = independent(&wrong, indexed.gap_m) * WRONG_PERCEPT_SHARE.ln();
-    if offsets.len() < JOINT_CONTACTS_MIN {
+    if kept < JOINT_CONTACTS_MIN {
         return (wrong < 0.0).then_some(wrong);
     }
     let covariance = |row: usize, column: usize, is_known: bool| {

@@ -16,8 +16,8 @@ use crate::recognition::joint_evidence::log_bayes_factor;
 use crate::recognition::likelihoods::step_share_logs;
 use crate::translations::{GaussianSum, UnknownLogs};
 use crate::tuning::{
-    EARNED_MAX, ERROR_REACH, MISS_PER_CONTACT, OUTLIER_SHARE, UNKNOWN_ERROR_REACH, UNKNOWN_PRIOR,
-    UNPREDICTED_ODDS,
+    EARNED_MAX, ERROR_REACH, JOINT_ODDS_CONTACTS, MISS_PER_CONTACT, OUTLIER_SHARE,
+    UNKNOWN_ERROR_REACH, UNKNOWN_PRIOR, UNPREDICTED_ODDS,
 };
 use crate::variant::VariantId;
 
@@ -204,6 +204,7 @@ impl Recognition {
             let library = leads.library * share(ERROR_REACH);
             UnknownLogs { library, ..leads }.log().min(0.0)
         };
+        let joint = joint.filter(|_| self.count >= JOINT_ODDS_CONTACTS);
         Some(UnknownLead { earned, joint })
     }
 

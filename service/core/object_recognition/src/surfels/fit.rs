@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Point3, Unit, Vector2, Vector3};
 
 use crate::model::ModelPlace;
+use crate::numeric::median;
 use crate::surfels::surfel::Surfel;
 use crate::tuning::{
     AREA_MAX, CURVATURE_RIDGE, DENSITY_NEIGHBOURS, FIT_NEIGHBOURS, FIT_WIDTH_MIN,
@@ -38,9 +39,9 @@ pub(crate) fn surfels(places: &[ModelPlace]) -> Vec<Surfel> {
         .map(|at| fit(&places, at, &neighbours[at]))
         .collect();
     // The scatter of few neighbours is itself uncertain: it is shrunk towards the median.
-    let usual_depth = median(fits.iter().map(|fit| fit.depth_m2));
-    let usual_angle = median(fits.iter().map(|fit| fit.angle));
-    let usual_area = median(fits.iter().map(|fit| fit.area_m2));
+    let usual_depth = median(fits.iter().map(|fit| fit.depth_m2).collect());
+    let usual_angle = median(fits.iter().map(|fit| fit.angle).collect());
+    let usual_area = median(fits.iter().map(|fit| fit.area_m2).collect());
     let shrunk = |own: f64, mean: f64, weight: f64| {
         (own.min(SCATTER_MAX * mean) * weight + mean * SHRINKAGE) / (weight + SHRINKAGE)
     };
@@ -62,13 +63,6 @@ pub(crate) fn surfels(places: &[ModelPlace]) -> Vec<Surfel> {
             place: own.place,
         })
         .collect()
-}
-
-/// The upper median; zero of no values.
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<_> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// A place with a normal.

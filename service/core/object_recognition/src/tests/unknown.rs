@@ -17,6 +17,41 @@ fn what_was_not_learned_is_unknown() {
 }
 
 #[test]
+fn a_ball_of_another_size_is_not_taken_for_the_known_one() {
+    // Of the same level all over: it tells nothing, and takes nothing away.
+    let felt = |radius_m: f64, key: u64| {
+        let contact = touch(on_ball(radius_m, key), &Isometry3::identity(), key);
+        contact.with_level(0, 2.0 + 0.05 * normal(40_000_000 + key), 0.1)
+    };
+    let mut model = ObjectModel::new(ModelSettings::default());
+    for key in 0..500 {
+        model.learn(&felt(0.05, key));
+    }
+    let mut library = ObjectLibrary::default();
+    library.put(ObjectId(0), model);
+    for (radius_m, is_known) in [(0.05, true), (0.03, false), (0.0375, false), (0.065, false)] {
+        for trial in 1..=12_u64 {
+            let mut recognition = Recognition::new(&Orientation::Known);
+            for count in 1..=30 {
+                recognition.touch(&library, felt(radius_m, 1_000 * trial + count));
+                let verdict = recognition.posterior(&library).verdict();
+                let about = format!("{radius_m}, {trial}: {verdict:?} after {count}");
+                if is_known {
+                    assert_ne!(verdict, Verdict::Unknown, "{about}");
+                    let is_named = verdict == Verdict::Object(ObjectId(0));
+                    assert!(is_named || count < 12, "{about}");
+                } else {
+                    // Five points of a ball may lie on another by chance.
+                    let is_named = matches!(verdict, Verdict::Object(_));
+                    assert!(!is_named || count < 8, "{about}");
+                    assert!(verdict == Verdict::Unknown || count < 30, "{about}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn what_lies_on_a_part_of_something_learned_is_another_thing() {
     /// A third of the ball's surface.
     const CAP: Shape = |key| {
