@@ -6,14 +6,15 @@ use std::fmt::Debug;
 use cogmap_proto as wire;
 use cogmap_proto::limits::{
     DESCRIPTOR_LEN_MAX, DESCRIPTOR_LEN_MIN, DURATION_S_MAX, LABEL_BYTES_MAX, METRES_MAX,
-    NAME_BYTES_MAX, RADIANS_PER_SECOND_MAX,
+    NAME_BYTES_MAX, RADIANS_PER_SECOND_MAX, ROTATIONS_MAX,
 };
 use cognitive_map::{
-    Descriptor, InvalidSample, Label, Level, Motion, PoseNoise, StartPose, Touch, TouchNoise,
+    Descriptor, InvalidSample, Label, Level, Motion, PoseNoise, Spacing, StartPose, Touch,
+    TouchNoise,
 };
 use serde::Serialize;
 
-use super::contact::{check_channels, touch, touch_noise};
+use super::contact::{check_channels, orientation, spacing, touch, touch_noise};
 use super::motion::noise;
 use super::name::check_name;
 use super::sighting::relation;
@@ -89,7 +90,7 @@ pub(super) fn in_sample(sample: &wire::Sample) -> String {
         wire::SampleBody::Marker(marker) => Fault(None)
             .or("label", &marker.label, Label::new(&marker.label))
             .within("body.marker"),
-        wire::SampleBody::Object(_) => "body.object".to_owned(),
+        wire::SampleBody::Object(mark) => in_object_mark(mark),
         wire::SampleBody::SessionEnd {} => "body.session_end".to_owned(),
     }
 }
@@ -113,7 +114,7 @@ fn name_of(target: &wire::Target) -> Result<(), InvalidSample> {
 }
 
 /// What a field must be, where the core's word for it has no limits.
-fn rule(field: &str, error: InvalidSample) -> String {
+pub(super) fn rule(field: &str, error: InvalidSample) -> String {
     let path = field.split(' ').next().unwrap_or_default();
     let name = path.rsplit('.').next().unwrap_or_default();
     match (error, name) {
@@ -126,6 +127,13 @@ fn rule(field: &str, error: InvalidSample) -> String {
         (InvalidSample::NumberOutOfRange, "translation_m" | "linear_m_s" | "offset_m") => {
             format!("must be finite, and at most {METRES_MAX:e}")
         }
+        (InvalidSample::NumberOutOfRange, "spacing_m") => {
+            let (least, most) = (Spacing::RANGE_M.start(), Spacing::RANGE_M.end());
+            format!("must be {least:e} to {most} m")
+        }
+        (InvalidSample::NumberOutOfRange, "orientation") => {
+            format!("must have 1 to {ROTATIONS_MAX} rotations")
+        }
         (InvalidSample::NumberOutOfRange, "value") => "must be finite".to_owned(),
         (InvalidSample::NumberOutOfRange, "relation") => {
             format!("must have finite numbers of at most {METRES_MAX:e}, and no negative range")
@@ -137,6 +145,9 @@ fn rule(field: &str, error: InvalidSample) -> String {
             "must be {DESCRIPTOR_LEN_MIN} to {DESCRIPTOR_LEN_MAX} numbers that are not all zero"
         ),
         (InvalidSample::InvalidLabel, "channel") => name_rule(),
+        (InvalidSample::InvalidLabel, "levels" | "descriptors") => {
+            format!("a channel {}", name_rule())
+        }
         (InvalidSample::InvalidLabel, "target") if field.contains("{\"agent\":") => name_rule(),
         (InvalidSample::InvalidLabel, "label" | "target") => {
             format!("must be 1 to {LABEL_BYTES_MAX} bytes without control characters")
@@ -178,24 +189,52 @@ pub(super) fn in_contact(at: usize, contact: &wire::Contact) -> String {
     });
     let drift = at_origin().and_then(|touch| touch.with_drift(contact.drift_sd_m));
     let position = plain().and_then(|noise| Touch::new(contact.position_m, noise));
-    let felt = wire::Contact {
-        position_m: [0.0; 3],
-        normal: None,
-        drift_sd_m: 0.0,
-        ..contact.clone()
+    // Its percepts of one kind.
+    let felt = |levels: &[wire::ContactLevel], descriptors: &[wire::Descriptor]| {
+        let felt = wire::Contact {
+            position_m: [0.0; 3],
+            normal: None,
+            drift_sd_m: 0.0,
+            levels: levels.to_vec(),
+            descriptors: descriptors.to_vec(),
+            reached: contact.reached,
+        };
+        check_channels(std::slice::from_ref(&felt)).map_err(|(_, error)| error)?;
+        plain().and_then(|noise| touch(&felt, noise))
     };
-    let felt = plain().and_then(|noise| touch(&felt, noise));
-    let channels = check_channels(std::slice::from_ref(contact));
     Fault(None)
         .or("position_m", &contact.position_m, position)
         .or_json("normal", &contact.normal, normal.transpose())
         .or("drift_sd_m", &contact.drift_sd_m, drift)
+        .or_json("levels", &contact.levels, felt(&contact.levels, &[]))
         .or_json(
-            "levels",
-            &contact.levels,
-            channels.map_err(|(_, error)| error).and(felt),
+            "descriptors",
+            &contact.descriptors,
+            felt(&[], &contact.descriptors),
         )
         .within(&format!("contacts[{at}]"))
+}
+
+/// The field of a mark of an episode.
+fn in_object_mark(mark: &wire::ObjectMark) -> String {
+    let (given, touch, spacing_m) = match mark {
+        wire::ObjectMark::Learn {
+            orientation,
+            noise,
+            spacing_m,
+            ..
+        } => (orientation, noise, Some(*spacing_m)),
+        wire::ObjectMark::Identify { orientation, noise }
+        | wire::ObjectMark::Recognise { orientation, noise } => (orientation, noise, None),
+        wire::ObjectMark::End {} => return "body.object".to_owned(),
+    };
+    let fault = Fault(None)
+        .or("spacing_m", &spacing_m, spacing_m.map(spacing).transpose())
+        .or_json("orientation", given, orientation(given));
+    match fault.0 {
+        None if touch_noise(touch).is_err() => format!("body.object.{}", in_touch_noise(touch)),
+        found => Fault(found).within("body.object"),
+    }
 }
 
 /// The field of the noise of contacts.

@@ -14,10 +14,10 @@ pub enum InvalidContacts {
     #[error("contacts must be 1 to {0}, not {1}")]
     Count(usize, usize),
     /// A contact makes no sense; which field of which.
-    #[error("{0}: {1}")]
+    #[error("{0}: {rule}", rule = fault::rule(.0, *.1))]
     Contact(String, InvalidSample),
     /// The noise, the spacing or the orientation makes no sense.
-    #[error("{0}: {1}")]
+    #[error("{0}: {rule}", rule = fault::rule(.0, *.1))]
     Field(String, InvalidSample),
     /// A contact lacks a normal, where the orientation is free.
     #[error("{0}: a free orientation needs the normal of every contact")]

@@ -2,7 +2,7 @@
 
 use axum::body::Body;
 use axum::http::Response;
-use cogmap_proto::{Codec, DecodeError, IngestAnswer, SampleBatch};
+use cogmap_proto::{Codec, DecodeError, IngestAnswer, Rejection, SampleBatch, SkipReason};
 
 use super::extract::{AgentName, AgentParams, Encoded, NoQuery};
 use super::json;
@@ -48,7 +48,7 @@ pub(crate) async fn post(
         .last()
         .map_or(0, |last| last.range.to);
     if answer.watermark.session == session && end_seq > first_seq {
-        answer.refused = explained(&body);
+        answer.refused = explained(&body, &answer.watermark.rejected);
     }
     Ok(reply::json(&answer))
 }
@@ -62,11 +62,31 @@ fn read(body: &Encoded) -> Result<SampleBatch, DecodeError> {
 
 /// Why samples of a body are refused. It is read a second time, so that one of which none is
 /// refused pays nothing.
-fn explained(body: &Encoded) -> Vec<String> {
-    let samples = read(body).map(|batch| batch.samples).unwrap_or_default();
-    let refused = samples.iter().enumerate().filter_map(|(at, sample)| {
-        let why = decode::refusal(sample)?;
-        Some(format!("samples[{at}].{why}"))
+fn explained(body: &Encoded, rejected: &[Rejection]) -> Vec<String> {
+    let Ok(batch) = read(body) else {
+        return Vec::new();
+    };
+    // Of those before the body and of earlier ranges than the listed ones the answer knows nothing.
+    let goes_back = |seq: u64| {
+        let mut back = rejected
+            .iter()
+            .filter(|one| one.reason == SkipReason::TimeBackwards);
+        back.any(|one| (one.range.from..one.range.to).contains(&seq))
+    };
+    let mut latest_ns = i64::MIN;
+    let refused = batch.samples.iter().zip(batch.first_seq..).enumerate();
+    let refused = refused.filter_map(|(at, (sample, seq))| {
+        if let Some(why) = decode::refusal(sample) {
+            return Some(format!("samples[{at}].{why}"));
+        }
+        let stamp_ns = sample.stamp_ns;
+        if stamp_ns < latest_ns || goes_back(seq) {
+            return Some(format!(
+                "samples[{at}].stamp_ns: {stamp_ns} is before the stamp of an earlier sample"
+            ));
+        }
+        latest_ns = stamp_ns;
+        None
     });
     refused.take(EXPLAINED_MAX).collect()
 }

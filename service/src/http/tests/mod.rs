@@ -15,6 +15,7 @@ mod removal;
 mod resources;
 mod routes;
 mod running;
+mod samples;
 mod told;
 mod trajectories;
 mod uniform;

@@ -151,6 +151,34 @@ async fn contacts_tell_the_object_and_its_pose() {
     );
 }
 
+#[tokio::test]
+async fn fields_of_contacts_are_refused_with_their_limits() {
+    let rig = taught().await;
+    let path = "/v1/spaces/lab/objects/identify";
+    let with = |key: &str, value: Value| {
+        let contacts = json!([{ "position_m": [0, 0, 0] }]);
+        let mut query = json!({ "orientation": { "known": {} }, "contacts": contacts });
+        query[key] = value;
+        serde_json::to_vec(&query).expect("JSON")
+    };
+    let label = |key: &str, own: Value| json!([{ "position_m": [0, 0, 0], key: [own] }]);
+    let level = label("levels", json!({ "channel": "a b", "value": 1.0 }));
+    let view = label("descriptors", json!({ "channel": "a", "vector": [0.0] }));
+    for (body, told) in [
+        (
+            with("orientation", json!({ "finite": { "rotations_xyzw": [] } })),
+            "orientation: must have 1 to 1000 rotations",
+        ),
+        (with("contacts", level), "a channel must be a name: 1 to"),
+        (with("contacts", view), "contacts[0].descriptors ["),
+    ] {
+        let refused = rig.send(Method::POST, path, JSON, body).await;
+        let problem = refused.problem(422, "invalid-query");
+        let detail = problem["detail"].as_str().expect("a text");
+        assert!(detail.contains(told), "{detail}");
+    }
+}
+
 /// A step along the rod.
 fn step(way_m: f64) -> SampleBody {
     SampleBody::Increment(Increment {
