@@ -127,6 +127,9 @@ pub(super) fn rule(field: &str, error: InvalidSample) -> String {
         (InvalidSample::NumberOutOfRange, "translation_m" | "linear_m_s" | "offset_m") => {
             format!("must be finite, and at most {METRES_MAX:e}")
         }
+        (InvalidSample::NumberOutOfRange, "position_m") => {
+            format!("must be finite, and at most {:e}", Touch::POSITION_MAX_M)
+        }
         (InvalidSample::NumberOutOfRange, "spacing_m") => {
             let (least, most) = (Spacing::RANGE_M.start(), Spacing::RANGE_M.end());
             format!("must be {least:e} to {most} m")
@@ -229,7 +232,7 @@ fn in_object_mark(mark: &wire::ObjectMark) -> String {
         wire::ObjectMark::End {} => return "body.object".to_owned(),
     };
     let fault = Fault(None)
-        .or("spacing_m", &spacing_m, spacing_m.map(spacing).transpose())
+        .or_json("spacing_m", &spacing_m, spacing_m.map(spacing).transpose())
         .or_json("orientation", given, orientation(given));
     match fault.0 {
         None if touch_noise(touch).is_err() => format!("body.object.{}", in_touch_noise(touch)),

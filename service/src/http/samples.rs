@@ -17,7 +17,8 @@ const EXPLAINED_MAX: usize = 16;
 ///
 /// Answers when they are on disk. Samples that had been there before are counted and otherwise
 /// ignored, so a request may be sent again after a broken connection. Samples that make no sense
-/// are refused one by one and listed in the watermark; `refused` says which field is wrong.
+/// are refused one by one and listed in the watermark, and so are those whose time goes back;
+/// `refused` says which field is wrong.
 #[utoipa::path(post, path = "/v1/spaces/{space}/agents/{agent}/samples", tag = "agents",
     operation_id = "send_samples", params(AgentParams),
     request_body(content(

@@ -170,6 +170,10 @@ async fn fields_of_contacts_are_refused_with_their_limits() {
             "orientation: must have 1 to 1000 rotations",
         ),
         (with("contacts", level), "a channel must be a name: 1 to"),
+        (
+            with("contacts", json!([{ "position_m": [0, 2e6, 0] }])),
+            "contacts[0].position_m [0.0, 2000000.0, 0.0]: must be finite, and at most 1e6",
+        ),
         (with("contacts", view), "contacts[0].descriptors ["),
     ] {
         let refused = rig.send(Method::POST, path, JSON, body).await;

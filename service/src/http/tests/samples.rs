@@ -1,5 +1,7 @@
 //! Samples that are refused.
 
+use cogmap_proto::{ObjectMark, Orientation, TouchNoise};
+
 use super::*;
 
 #[tokio::test]
@@ -15,6 +17,45 @@ async fn samples_that_make_no_sense_are_listed_not_taken() {
     assert_eq!(rejected["reason"], "non_unit_quaternion", "{answer}");
     assert_eq!(rejected["range"], serde_json::json!({ "from": 1, "to": 2 }));
     assert_eq!(answer["refused"].as_array().map(Vec::len), Some(1));
+}
+
+#[tokio::test]
+async fn marks_of_episodes_are_refused_by_their_field_and_its_limits() {
+    let rig = rig();
+    let learn = |spacing_m| {
+        SampleBody::Object(ObjectMark::Learn {
+            name: Some("cup".to_owned()),
+            spacing_m,
+            orientation: Orientation::Known {},
+            noise: TouchNoise::default(),
+        })
+    };
+    let identify = |orientation, position_sd_m| {
+        let noise = TouchNoise {
+            position_sd_m,
+            ..TouchNoise::default()
+        };
+        SampleBody::Object(ObjectMark::Identify { orientation, noise })
+    };
+    let no_rotations = Orientation::Finite {
+        rotations_xyzw: Vec::new(),
+    };
+    let marks = [
+        (learn(0.0), "spacing_m 0.0: must be 1e-5 to 1000 m"),
+        (
+            identify(no_rotations, 0.001),
+            "orientation {\"finite\":{\"rotations_xyzw\":[]}}: must have 1 to 1000 rotations",
+        ),
+        (
+            identify(Orientation::Known {}, -1.0),
+            "noise.position_sd_m -1.0: a standard deviation is negative",
+        ),
+    ];
+    for (seq, (mark, told)) in (0..).zip(marks) {
+        let answer = rig.samples("rover", &at(1, seq, mark)).await.good();
+        let expected = format!("samples[0].body.object.{told}");
+        assert_eq!(answer["refused"], serde_json::json!([expected]));
+    }
 }
 
 #[tokio::test]

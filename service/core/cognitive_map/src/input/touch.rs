@@ -7,9 +7,6 @@ use nalgebra::{Point3, Unit, Vector3};
 use super::{Descriptor, InvalidSample, LEVEL_MAX, Label, Level, Spacing, TouchNoise};
 use object_recognition::{Contact, DescriptorReading, LevelReading, Reached};
 
-/// Largest coordinate \[m\].
-const METRES_MAX: f64 = 1e6;
-
 /// A level that was sensed at a contact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TouchLevel {
@@ -47,12 +44,15 @@ pub struct Touch {
 }
 
 impl Touch {
+    /// Largest coordinate of a contact \[m\].
+    pub const POSITION_MAX_M: f64 = 1e6;
+
     /// A contact at a position \[m\].
     ///
     /// # Errors
     /// A coordinate is out of range.
     pub fn new(position_m: [f64; 3], noise: TouchNoise) -> Result<Self, InvalidSample> {
-        if !position_m.iter().all(|x| x.abs() <= METRES_MAX) {
+        if !position_m.iter().all(|x| x.abs() <= Self::POSITION_MAX_M) {
             return Err(InvalidSample::NumberOutOfRange);
         }
         Ok(Self {
