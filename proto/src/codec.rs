@@ -111,6 +111,9 @@ impl Codec {
             codec: self.name(),
             detail,
         };
+        if bytes.is_empty() && self != Self::Postcard {
+            return Err(malformed("there is no message".to_owned()));
+        }
         match self {
             Self::Postcard => {
                 let (message, rest) = postcard::take_from_bytes(bytes)

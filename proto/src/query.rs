@@ -26,6 +26,18 @@ pub enum Verb {
 }
 
 impl Verb {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::Recall,
+        Self::Watermark,
+        Self::Predict,
+        Self::Identify,
+        Self::Localize,
+        Self::Route,
+        Self::Sequence,
+        Self::Felt,
+    ];
+
     /// Last chunk of the key.
     pub fn as_str(self) -> &'static str {
         match self {

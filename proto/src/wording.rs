@@ -65,8 +65,9 @@ fn kind(expected: &str) -> String {
     let whole = |most: u64| format!("a whole number from 0 to {most}");
     let plain = match expected {
         "f64" | "f32" | "float" => "a number",
-        "u64" | "usize" => "a whole number from 0 on",
-        "i64" | "integer" => "a whole number",
+        "u64" | "usize" => return whole(u64::MAX),
+        "i64" => return format!("a whole number from {} to {}", i64::MIN, i64::MAX),
+        "integer" => "a whole number",
         "u32" => return whole(u32::MAX.into()),
         "u16" => return whole(u16::MAX.into()),
         "u8" => return whole(u8::MAX.into()),

@@ -24,6 +24,9 @@ pub enum InvalidQuery {
     /// There is a radius but no centre.
     #[error("radius_m needs position_m, its centre")]
     RadiusWithoutPosition,
+    /// The span of time ends before it begins \[ns\].
+    #[error("since_ns {0} must not be after until_ns {1}")]
+    Span(i64, i64),
     /// A phase is outside \[0, 1).
     #[error("phases in code must be at least 0 and less than 1; code[{0}] is {1:?}")]
     Phase(usize, [f64; 3]),
@@ -67,6 +70,11 @@ pub fn cue(map: &CognitiveMap, query: &RecallQuery) -> Result<RecallCue, Invalid
         if position.is_none() {
             return Err(InvalidQuery::RadiusWithoutPosition);
         }
+    }
+    if let Some((since_ns, until_ns)) = query.since_ns.zip(query.until_ns)
+        && since_ns > until_ns
+    {
+        return Err(InvalidQuery::Span(since_ns, until_ns));
     }
     let code = query
         .code

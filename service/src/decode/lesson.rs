@@ -1,5 +1,7 @@
 //! Lessons about objects, and questions which object was touched.
 
+use std::collections::BTreeSet;
+
 use cogmap_proto as wire;
 use cogmap_proto::limits::{IDENTIFY_CONTACTS_MAX, LESSON_CONTACTS_MAX};
 use cognitive_map::{InvalidSample, Lesson, Touch};
@@ -16,6 +18,9 @@ pub enum InvalidContacts {
     /// A contact makes no sense; which field of which.
     #[error("{0}: {rule}", rule = fault::rule(.0, *.1))]
     Contact(String, InvalidSample),
+    /// A contact has more than one level, or more than one descriptor, of a channel.
+    #[error("{0}: {1:?} is there more than once")]
+    Repeated(String, String),
     /// The noise, the spacing or the orientation makes no sense.
     #[error("{0}: {rule}", rule = fault::rule(.0, *.1))]
     Field(String, InvalidSample),
@@ -81,7 +86,28 @@ pub fn touches_to_identify(
 
 fn check_channels(contacts: &[wire::Contact]) -> Result<(), InvalidContacts> {
     let checked = contact::check_channels(contacts);
-    checked.map_err(|refused| of_contact(contacts, refused))
+    checked.map_err(|refused| of_contact(contacts, refused))?;
+    for (at, contact) in contacts.iter().enumerate() {
+        let levels = contact.levels.iter().map(|level| &level.channel);
+        let descriptors = contact.descriptors.iter().map(|seen| &seen.channel);
+        check_once(|| format!("contacts[{at}].levels"), levels)?;
+        check_once(|| format!("contacts[{at}].descriptors"), descriptors)?;
+    }
+    Ok(())
+}
+
+/// Checks that no channel is there twice: a contact has one value of each.
+fn check_once<'a>(
+    field: impl Fn() -> String,
+    channels: impl Iterator<Item = &'a String>,
+) -> Result<(), InvalidContacts> {
+    let mut seen = BTreeSet::new();
+    for channel in channels {
+        if !seen.insert(channel) {
+            return Err(InvalidContacts::Repeated(field(), channel.clone()));
+        }
+    }
+    Ok(())
 }
 
 fn of_contact(contacts: &[wire::Contact], (at, error): (usize, InvalidSample)) -> InvalidContacts {

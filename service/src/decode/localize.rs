@@ -11,7 +11,7 @@ use super::sample::sample as read_sample;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidSequence {
     /// There are none, or too many.
-    #[error("samples must be 1 to {LOCALIZE_SAMPLES_MAX}, not {0}")]
+    #[error("samples must be 1 to {LOCALIZE_SAMPLES_MAX}, not {told}", told = counted(*.0))]
     Count(usize),
     /// A sample makes no sense.
     #[error("samples[{0}].{1}: {2}")]
@@ -25,6 +25,15 @@ pub enum InvalidSequence {
     /// A sample begins or ends an episode with an object, of which nothing would be learned.
     #[error("samples[{0}]: an episode with an object has no place where a pose is asked for")]
     Object(usize),
+}
+
+/// How many samples there are, as far as they are counted when they are read.
+fn counted(count: usize) -> String {
+    if count > LOCALIZE_SAMPLES_MAX {
+        "more".to_owned()
+    } else {
+        count.to_string()
+    }
 }
 
 /// The samples of a question, as the map takes them.

@@ -160,11 +160,15 @@ fn of_path(text: &str) -> String {
 
 /// What axum says of query parameters.
 fn of_query(text: &str) -> String {
-    text.trim_start_matches("Failed to deserialize query string: ")
-        .replace(
-            "invalid digit found in string",
-            "expected a whole number from 0 on",
-        )
+    let text = text.trim_start_matches("Failed to deserialize query string: ");
+    // Stamps may be negative, all other whole numbers are counts.
+    let is_stamp = { text.split(':').next() }.is_some_and(|name| name.ends_with("_ns"));
+    let whole = if is_stamp {
+        "expected a whole number"
+    } else {
+        "expected a whole number from 0 on"
+    };
+    text.replace("invalid digit found in string", whole)
         .replace(
             "cannot parse integer from empty string",
             "expected a whole number",

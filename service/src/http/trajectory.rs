@@ -76,7 +76,8 @@ pub(crate) struct TrajectoryQuery {
         (status = 200, description = "The poses, oldest first", content(
             (Trajectory = "application/json"), (String = "text/plain"))),
         (status = 404, description = "There is no such space or agent"),
-        (status = 422, description = "A session was named for a refined trajectory")))]
+        (status = 422, description = "A session was named for a refined trajectory, or the span \
+            ends before it begins")))]
 pub(crate) async fn get(
     State(service): State<Service>,
     AgentName(space, agent): AgentName,
@@ -87,6 +88,12 @@ pub(crate) async fn get(
     let limit = page::limit(query.limit)?;
     agent_once_named(&space, agent.as_str())?;
     let (name, from_ns, to_ns) = (agent.as_str(), query.from_ns, query.to_ns);
+    if let Some((from, to)) = from_ns.zip(to_ns)
+        && from > to
+    {
+        let detail = format!("from_ns {from} must not be after to_ns {to}");
+        return Err(Problem::new(Kind::InvalidQuery, detail));
+    }
     let read = match query.kind.unwrap_or_default() {
         TrajectoryKind::Causal => {
             space

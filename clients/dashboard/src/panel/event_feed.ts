@@ -8,6 +8,8 @@ import { exact, metres, percent, some, time } from "./format";
 
 /** Lines that stay. */
 const LINES_MAX = 60;
+/** A correction that is no more than this is no news [m]. */
+const MOVED_MIN_M = 0.01;
 
 /** An event in a few words after its agent; null for those that only flash in the scene. */
 export function inWords({ kind, fields }: ShownEvent): string | null {
@@ -21,8 +23,10 @@ export function inWords({ kind, fields }: ShownEvent): string | null {
       const [x, y, z] = fields["translation_m"] as Vec3;
       return `was found at ${[x, y, z].map((c) => metres(c).replace(" m", "")).join(", ")} m`;
     }
-    case "loops_closed":
-      return `closed loops and moved by ${metres(Number(fields["moved_m"]))}`;
+    case "loops_closed": {
+      const movedM = Number(fields["moved_m"]);
+      return movedM < MOVED_MIN_M ? null : `closed loops and moved by ${metres(movedM)}`;
+    }
     case "trip_ended":
       if (fields["reason"] === "full") {
         return null; // The next one continues it.
@@ -97,10 +101,11 @@ export class EventFeed {
         name.style.color = agentColour(palette, agent.colour);
       }
       const stamp = event.event.stamp_ns;
-      const when = event.s === 0 ? "–" : time(stamp).replace(/\.\d$/, "");
+      const isStamped = Number(stamp) !== 0;
+      const when = isStamped ? time(stamp).replace(/\.\d$/, "") : "–";
       const line = h(
         "li",
-        { title: event.s === 0 ? "" : exact(stamp) },
+        { title: isStamped ? exact(stamp) : "" },
         h("time", {}, when),
         h("span", {}, name, ` ${words}`),
       );

@@ -40,7 +40,9 @@ _LARGEST = 1.7976931348623157e308
 
 
 def within(name: str, value: float, low: float, high: float) -> float:
-    """`value` as a finite float from `low` to `high`."""
+    """`value` as a finite float from `low` to `high`. Neither a text nor a truth value is one."""
+    if isinstance(value, (str, bytes, bool)):
+        raise InvalidValue(name, value, "expected a number")
     try:
         result = float(value)
     except (TypeError, ValueError, OverflowError) as error:

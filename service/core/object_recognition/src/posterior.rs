@@ -70,8 +70,7 @@ impl Posterior {
 
 /// Shannon entropy of probabilities \[nats\].
 pub(crate) fn entropy_nats(probabilities: impl Iterator<Item = f64>) -> f64 {
-    -probabilities
-        .filter(|p| *p > 0.0)
-        .map(|p| p * p.ln())
-        .sum::<f64>()
+    let logs = probabilities.filter(|p| *p > 0.0).map(|p| p * p.ln());
+    // Certainty is 0, not -0.
+    0.0 - logs.sum::<f64>()
 }

@@ -32,6 +32,20 @@ pub enum RowBody {
     Revisit(i64),
 }
 
+impl RowBody {
+    /// The motion that ends at the row, if it is one.
+    pub(super) fn motion(&self) -> Option<Isometry3<f64>> {
+        match self {
+            Self::Increment(motion, _) => Some(*motion),
+            Self::Velocity([linear, angular], duration_s) => {
+                let (linear, angular) = (linear * *duration_s, angular * *duration_s);
+                Some(geometry::se3::exp(&linear, &angular))
+            }
+            _ => None,
+        }
+    }
+}
+
 impl Row {
     /// Reads the columns of a line.
     ///

@@ -31,8 +31,9 @@ pub struct Choice {
 }
 
 impl TableSet {
-    /// What an agent would have sent, from a start pose on if there is one. Stamps are a second
-    /// later than in the set. A view of which all numbers are zero is none.
+    /// What an agent would have sent, from a start pose on if it is known where it was at its first
+    /// row: a motion there has led it to that. Stamps are a second later than in the set. A view of
+    /// which all numbers are zero is none.
     ///
     /// # Errors
     /// It names a view that is not there.
@@ -46,7 +47,11 @@ impl TableSet {
         let rows = self.agents.get(agent).map_or(&[][..], |log| &log.rows);
         let first_ns = rows.first().map_or(0, |row| Self::sent_ns(row.stamp_ns));
         match start {
-            Some(start) => drop(stream.start(first_ns - 1, start)),
+            Some(start) => {
+                let motion = rows.first().and_then(|row| row.body.motion());
+                let before = start * motion.unwrap_or_default().inverse();
+                stream.start(first_ns - 1, &before);
+            }
             None => stream.begin(first_ns - 1),
         }
         // Stamps and numbers of the motions.

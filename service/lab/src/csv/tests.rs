@@ -1,7 +1,7 @@
 //! Tables as the format says, and what is sent of them.
 
 use cogmap_proto::{Increment, NameError, Relation, SampleBody, Target};
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 
 use crate::stream::Stream;
 
@@ -72,6 +72,29 @@ fn an_agent_sends_its_rows_a_second_later() {
         if matches!(seen.relation, Relation::Range { range_m: 4.0, range_sd_m: 0.5, .. })));
     assert!(matches!(bodies[6], SampleBody::Sighting(seen) if seen.target == Target::OwnSample(1)));
     assert_eq!(stream.samples()[6].stamp_ns, 21_000_000_000);
+}
+
+/// Truth is known at the stamps of rows: a motion there has led to it.
+#[test]
+fn exact_motions_lead_along_the_truth() {
+    let rows = "1.0,a,increment,1,0,0,0.5,0,0,0\n2.0,a,velocity,1,0,0.5,1.0\n";
+    let from_there = Isometry3::new(Vector3::new(3.0, -2.0, 0.0), Vector3::z() * 0.7);
+    for table in [rows, "0.0,a,level,light,1\n", "0.5,a,velocity,2,0,-1,0.5\n"] {
+        let rows = if table == rows {
+            rows
+        } else {
+            &format!("{table}{rows}")
+        };
+        let text = format!("t_s,agent,kind,f1,f2,f3,f4,f5,f6,f7\n{rows}");
+        let set = TableSet::read(&text, "").unwrap();
+        let stream = set.stream("a", Some(&from_there), &Choice::default());
+        let stream = stream.unwrap();
+        // The first row of a reckoned way is the start pose, and the next one follows a motion.
+        let at_first_row = usize::from(set.agents["a"].rows[0].body.motion().is_some());
+        let off = stream.reckoned()[at_first_row].pose.inverse() * from_there;
+        assert!(off.translation.vector.norm() < 1e-12, "{table}");
+        assert!(off.rotation.angle() < 1e-12, "{table}");
+    }
 }
 
 #[test]

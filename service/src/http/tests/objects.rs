@@ -164,6 +164,8 @@ async fn fields_of_contacts_are_refused_with_their_limits() {
     let label = |key: &str, own: Value| json!([{ "position_m": [0, 0, 0], key: [own] }]);
     let level = label("levels", json!({ "channel": "a b", "value": 1.0 }));
     let view = label("descriptors", json!({ "channel": "a", "vector": [0.0] }));
+    let levels = [1.0, 2.0].map(|value| json!({ "channel": "a", "value": value }));
+    let twice = json!([{ "position_m": [0, 0, 0], "levels": levels }]);
     for (body, told) in [
         (
             with("orientation", json!({ "finite": { "rotations_xyzw": [] } })),
@@ -175,6 +177,10 @@ async fn fields_of_contacts_are_refused_with_their_limits() {
             "contacts[0].position_m [0.0, 2000000.0, 0.0]: must be finite, and at most 1e6",
         ),
         (with("contacts", view), "contacts[0].descriptors ["),
+        (
+            with("contacts", twice),
+            "contacts[0].levels: \"a\" is there more than once",
+        ),
     ] {
         let refused = rig.send(Method::POST, path, JSON, body).await;
         let problem = refused.problem(422, "invalid-query");

@@ -99,6 +99,15 @@ async fn parameters_that_cannot_be() {
         let path = format!("/v1/spaces/lab/places?{query}");
         rig.get(&path).await.problem(400, "invalid-parameter");
     }
+    // Stamps may be negative, counts not.
+    for (query, told) in [
+        ("since_ns=1.5", "since_ns: expected a whole number"),
+        ("limit=-1", "limit: expected a whole number from 0 on"),
+    ] {
+        let path = format!("/v1/spaces/lab/places?{query}");
+        let problem = rig.get(&path).await.problem(400, "invalid-parameter");
+        assert_eq!(problem["detail"], told);
+    }
     for path in [
         "/v1/spaces?x=1",
         "/v1/spaces/lab?x=1",
@@ -222,6 +231,7 @@ async fn bodies_that_make_no_sense() {
         ("{\"position_m\": [0, 0, 0], \"radius_m\": -1}", "radius_m"),
         ("{\"limit\": 0}", "limit"),
         ("{\"limit\": 1001}", "limit"),
+        ("{\"since_ns\": 2, \"until_ns\": 1}", "since_ns 2"),
         ("{\"code\": [[0.5, 0.5, 0.5]]}", "modules"),
         ("{\"code\": [[1, 0, 0], null, null, null, null]}", "phases"),
         ("{\"agent\": \"a b\"}", "agent"),

@@ -32,6 +32,8 @@ async fn the_past_is_refined_for_who_asks() {
         .get(&format!("{path}&from_ns=1000000000&to_ns=2000000000"))
         .await
         .good();
+    let back = rig.get(&format!("{path}&from_ns=2&to_ns=1")).await;
+    back.problem(422, "invalid-query");
     let part = part["poses"].as_array().expect("poses");
     assert!(!part.is_empty() && part.len() < stamps.len());
     let tum = rig.get(&format!("{path}&format=tum&limit=2")).await;

@@ -48,7 +48,7 @@ use state::{CorruptState, State, StateReader, StateWriter};
 /// Version of the layout above, and of what the fold makes of records: with either this number
 /// grows. A checkpoint of another version is not read, because a map that goes on from it would not
 /// be the one that the journal gives; the map is made anew from that.
-const VERSION: u16 = 46;
+const VERSION: u16 = 47;
 
 const HEADER: u8 = 0;
 const AGENTS: u8 = 1;

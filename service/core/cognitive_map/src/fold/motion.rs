@@ -37,6 +37,10 @@ impl Fold<'_> {
         if !self.agent.placed() {
             return;
         }
+        if self.may_be_anywhere() {
+            (self.agent.place, self.agent.entered) = (None, None);
+            return;
+        }
         if let Some(leg) = &mut self.agent.recorder.leg {
             leg.extend(increment, &step.variance);
         }

@@ -58,13 +58,11 @@ impl Fold<'_> {
         };
         let (news, said) = episode.end(self.objects, (self.now, self.revision));
         self.emit_object_news(news, episode.count());
-        if episode.count() > 0 {
-            self.emit(EventKind::EpisodeEnded {
-                session: self.agent.session(),
-                teaches: episode.teaches(),
-                posterior: said.map(Box::new),
-            });
-        }
+        self.emit(EventKind::EpisodeEnded {
+            session: self.agent.session(),
+            teaches: episode.teaches(),
+            posterior: said.map(Box::new),
+        });
     }
 
     fn emit_object_news(&mut self, news: Vec<News>, contacts: u64) {

@@ -133,6 +133,14 @@ impl Fold<'_> {
         Status::of(self.agent, sd_m, is_doubted, self.settings) == Status::Lost
     }
 
+    /// Whether an agent of the map may be anywhere in it, since what it saw contradicted where it
+    /// was thought to be: what it does until it is found again belongs to no place.
+    pub(super) fn may_be_anywhere(&self) -> bool {
+        let number = self.agent_id.0;
+        let covariance = || self.estimator.covariance(number);
+        self.keyframes.is_kidnapped(number) && covariance().is_none_or(|own| self.is_lost(&own))
+    }
+
     /// What the agent sees contradicts its estimate: it may be anywhere from now on, and what it
     /// sensed before was elsewhere.
     pub(super) fn lose_agent(&mut self) {
@@ -213,9 +221,9 @@ impl Fold<'_> {
     }
 
     /// The place that answers at a position, with its confidence; none for an agent that is not
-    /// placed, whose positions are those of no map.
+    /// placed, whose positions are those of no map, or that may be anywhere.
     pub(super) fn answering(&self, position: &Point3<f64>) -> Option<(PlaceId, f64)> {
-        if !self.agent.placed() {
+        if !self.agent.placed() || self.may_be_anywhere() {
             return None;
         }
         let (place, distance_m) = self.places.winner(position)?;

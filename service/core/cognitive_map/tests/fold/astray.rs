@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use cognitive_map::{CognitiveMap, Motion, PoseNoise, SampleBody, Settings, Status};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use crate::journal::{Robot, descriptor, start_pose};
+use crate::journal::{Robot, descriptor, level, start_pose};
 
 use random::Seeded;
 
@@ -213,6 +213,43 @@ fn a_robot_that_is_where_it_believes_to_be_is_never_lost() {
         assert!(called.iter().all(|status| *status != Status::Lost));
         assert!(walker.off_m(&map) < 1.0, "{}", walker.off_m(&map));
     }
+}
+
+/// Where it is not known to be, a robot that may be anywhere teaches nobody anything.
+#[test]
+fn a_robot_that_may_be_anywhere_founds_and_teaches_no_place() {
+    let (mut map, room) = explored();
+    let mut walker = Walker::told(&mut map, [4.0, 3.0], 0.0, 8);
+    let light = |map: &mut CognitiveMap, walker: &mut Walker| {
+        walker.turn(map, &room, 1);
+        walker.robot.sample(map, level("light", 3.0, [0.0; 3]));
+    };
+    (0..30).for_each(|_| light(&mut map, &mut walker));
+    // Out of the room, to where nobody has been and nothing looks like it.
+    walker.carry([80.0, -60.0], 2.5);
+    for _ in 0..40 {
+        light(&mut map, &mut walker);
+        if map.status(walker.robot.id) == Some(Status::Lost) {
+            break;
+        }
+    }
+    assert_eq!(map.status(walker.robot.id), Some(Status::Lost));
+    let memory = |map: &CognitiveMap| {
+        let places = map.places().map(|(id, place)| {
+            let taught: u64 = map.remembered(id).map(|own| own.percepts).sum();
+            (id, place.visits(), taught)
+        });
+        (places.collect::<Vec<_>>(), map.trips_recorded())
+    };
+    let before = memory(&map);
+    assert!(before.0.iter().any(|(_, _, taught)| *taught > 0));
+    for _ in 0..100 {
+        walker.step(&mut map, &room, 0.0);
+        walker.robot.sample(&mut map, level("light", 9.0, [0.0; 3]));
+        assert_eq!(map.status(walker.robot.id), Some(Status::Lost));
+        assert!(map.agent(walker.robot.id).unwrap().place().is_none());
+    }
+    assert_eq!(memory(&map), before);
 }
 
 /// A robot that is told where it stands is not where it was told wrongly.

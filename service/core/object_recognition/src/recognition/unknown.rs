@@ -150,7 +150,9 @@ impl Recognition {
     /// leads by what all contacts tell together ([`log_bayes_factor`]), and by no more than one
     /// after the other tells over all of its poses. An unknown object that leads counts as by fewer
     /// contacts, and keeps the odds of [`doubt`], by which it comes first and nothing is answered.
-    /// Of few contacts each lead counts as that of fewer ones.
+    /// Of few contacts each lead counts as that of fewer ones. Along a curve it counts whole: its
+    /// places predict what lies between them about as exactly as they say, which those of a surface
+    /// with edges do not.
     ///
     /// Of an object whose contacts fell on places alone, what [`told_by_gaps`] adds to a lead takes
     /// an answer away, but calls nothing unknown: at a place that was missed a known object is
@@ -196,7 +198,9 @@ impl Recognition {
         let joint = log_bayes_factor(indexed, library.level_prior(), &pose, &self.contacts);
         let joint = joint.map(|joint| f64::max(-joint, leads.library));
         let lead = joint.unwrap_or(lead);
-        let earned = if lead > 0.0 {
+        let earned = if lead > 0.0 && joint.is_some() && indexed.is_curve {
+            lead
+        } else if lead > 0.0 {
             f64::max(lead * share(UNKNOWN_ERROR_REACH), lead.min(doubt))
         } else if joint.is_some() {
             lead

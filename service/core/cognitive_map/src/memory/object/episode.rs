@@ -202,7 +202,8 @@ impl Episode {
         (now, revision): (Clock, u64),
     ) -> (Vec<News>, Option<Posterior>) {
         if self.count == 0 {
-            return (Vec::new(), None);
+            let is_named = matches!(self.purpose, Purpose::Learn(Some(_)));
+            return (Vec::new(), (!is_named).then(|| self.posterior(memory)));
         }
         let (mut news, mut said) = self.reflect(memory, (now, revision));
         let learned = match &self.purpose {
