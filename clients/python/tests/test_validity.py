@@ -124,7 +124,10 @@ CALLS: Tuple[Tuple[Callable[[Recorder], object], str], ...] = (
     ),
     (lambda r: r.marker(""), "label: expected 1 to 128 bytes of UTF-8, not '' of 0 bytes"),
     (lambda r: r.level("light", math.inf), "value: expected a finite number, not inf"),
-    (lambda r: r.level("light", "1"), "value: expected a number, not '1'"),  # type: ignore[arg-type]
+    (
+        lambda r: r.level("light", "1"),  # type: ignore[arg-type]
+        "value: expected a number, not '1'",
+    ),
     (lambda r: r.level("light", True), "value: expected a number, not True"),
     (
         lambda r: r.descriptor("view", [1.0] * 7),

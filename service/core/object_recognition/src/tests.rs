@@ -14,6 +14,7 @@ use crate::variant::{Variant, VariantId};
 
 mod bodies;
 mod levels;
+mod runs;
 mod sizes;
 mod sparse;
 mod turns;

@@ -19,9 +19,13 @@ use crate::tuning::{EVEN_SHARE_MIN, FIELD_PER_SPACING, NODE_STEP};
 #[derive(Clone, Debug)]
 pub(crate) struct OpenRegion {
     felt: Vec<FeltPlace>,
+    /// Whether all places are at the edge of what was felt.
+    is_edge_everywhere: bool,
     nearest: NearestPlace,
     /// The places and nodes about the edge of what was felt.
     entries: Vec<u32>,
+    /// Whether what is missing are holes in a surface that is known about them.
+    pub(crate) has_holes: bool,
     /// Typical distance of places \[m\].
     typical_m: f64,
     /// Share of contacts in a gap that are not as predicted there.
@@ -125,6 +129,8 @@ impl OpenRegion {
         let step = entries.len().div_ceil(ENTRIES_MAX).max(1);
         Some(Self {
             felt: places,
+            is_edge_everywhere: everywhere,
+            has_holes: !is_curve,
             nearest: NearestPlace::new(felt),
             entries: entries.into_iter().step_by(step).collect(),
             typical_m: graph.typical_m,
@@ -167,9 +173,29 @@ impl OpenRegion {
         (-step_m / (MISSING_PER_KNOWN * self.known_m).max(f64::MIN_POSITIVE)).exp()
     }
 
-    /// Probability that a walk beyond what was felt is still there after a step \[m\].
-    pub(crate) fn stay_beyond(&self, step_m: f64) -> f64 {
-        (-step_m / (STAY_PER_MISSING * self.missing_m).max(f64::MIN_POSITIVE)).exp()
+    /// Probability that a walk that has been beyond what was felt for so long \[m\] is still there
+    /// after a step \[m\].
+    ///
+    /// Holes are as large as their edges tell. How much is missing beyond the ends of a curve is
+    /// hardly known: of the walks of any length half are back after about as much again (Lomax
+    /// 1954).
+    pub(crate) fn stay_beyond(&self, walked_m: f64, step_m: f64) -> f64 {
+        let typical_m = STAY_PER_MISSING * self.missing_m;
+        if self.has_holes {
+            return (-step_m / typical_m.max(f64::MIN_POSITIVE)).exp();
+        }
+        let before_m = typical_m + walked_m;
+        before_m / (before_m + step_m).max(f64::MIN_POSITIVE)
+    }
+
+    /// Whether what was felt tells nothing of a point. Where a walk went over a surface all of it
+    /// is the edge, and yet the surface about it is known.
+    pub(crate) fn is_beyond(&self, point: &Point3<f64>) -> bool {
+        if !self.is_edge_everywhere {
+            return self.part(point) == Part::Beyond;
+        }
+        let nearest = self.nearest.find(point);
+        nearest.is_some_and(|(square, _)| square > self.typical_m.powi(2))
     }
 
     /// Probability that a step \[m\] from what was felt leads beyond it: as many lead there as
@@ -177,7 +203,7 @@ impl OpenRegion {
     /// missing at all.
     pub(crate) fn leave(&self, step_m: f64, has_left: bool) -> f64 {
         let prior = if has_left { 1.0 } else { PARTIAL_PRIOR };
-        ((1.0 - self.stay_beyond(step_m)) * self.missing_odds * prior).min(1.0)
+        ((1.0 - self.stay_beyond(0.0, step_m)) * self.missing_odds * prior).min(1.0)
     }
 
     /// What the model says of a point.

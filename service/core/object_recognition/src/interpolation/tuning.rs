@@ -57,7 +57,8 @@ pub(super) const UNEXPECTED_SHARE: f64 = 0.5;
 pub(super) const PARTIAL_PRIOR: f64 = 0.1;
 /// Mean length of a part that is not as predicted, per that of what was felt. Chosen.
 pub(super) const MISSING_PER_KNOWN: f64 = 0.5;
-/// Length that a walk stays beyond what was felt, per length of what is missing. Chosen.
+/// Length of a walk beyond what was felt after which half of them are back, per length of what is
+/// missing. Chosen.
 pub(super) const STAY_PER_MISSING: f64 = 0.5;
 /// Distance from where it begins at which a walk may enter what was explored, in typical links.
 /// Chosen.

@@ -8,7 +8,7 @@ use crate::contact::Contact;
 use crate::gaussian_process::{factor, independent, log_density, matern};
 use crate::indexed_model::IndexedModel;
 use crate::indexed_place::Prediction;
-use crate::interpolation::{BodyPoint, OpenRegion, Part, PlacedLevel};
+use crate::interpolation::{BodyPoint, OpenRegion, PlacedLevel};
 use crate::level_prior::LevelPrior;
 use crate::tuning::{
     ERROR_REACH, JOINT_CONTACTS, JOINT_CONTACTS_MIN, JOINT_SDS, LEVEL_MAX, LOCAL_ERROR_SHARE,
@@ -89,7 +89,7 @@ fn surface_factor(
     let (mut wrong, mut kept) = (Vec::new(), 0);
     for contact in contacts {
         let at = map_from_episode * contact.position_m;
-        let is_beyond = |open: &OpenRegion| open.part(&at) == Part::Beyond;
+        let is_beyond = |open: &OpenRegion| open.is_beyond(&at);
         // What was never felt of the object says nothing of it.
         if indexed.open.as_ref().is_some_and(is_beyond) {
             continue;

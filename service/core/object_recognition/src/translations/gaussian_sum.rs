@@ -98,7 +98,8 @@ impl GaussianSum {
         let best = best.fold(self.prefilter.best_log(), f64::max);
         let (rotations, least) = (&self.rotations, best - PRUNE_NATS);
         { &self.unexplored }.entered(library, rotations, (last, contact), bare, least, &mut parts);
-        self.unexplored.stayed(densities);
+        let step_m = (contact.position_m - last.position_m).norm();
+        self.unexplored.stayed(densities, step_m);
         self.all = merged(&parts);
         self.prune(library);
         Some(unknown?.log)

@@ -26,6 +26,8 @@ use crate::variant::VariantId;
 pub(crate) struct Unexplored {
     /// Log of the mass of the episodes that were nowhere else so far.
     pub(crate) logs: BTreeMap<VariantId, f64>,
+    /// Length of the walk so far \[m\].
+    walked_m: f64,
     /// Densities of the contacts after the first, as far as hypotheses may be replayed by them.
     pub(crate) history: Vec<Arc<BTreeMap<VariantId, UnpredictedDensity>>>,
 }
@@ -41,13 +43,14 @@ impl Unexplored {
             .filter_map(|(of, indexed)| Some((of, indexed.open.as_ref()?.unexplored.ln())));
         Self {
             logs: logs.collect(),
+            walked_m: 0.0,
             history: Vec::new(),
         }
     }
 
     /// Densities of a contact, from those of one with an unknown object; those of an object are
-    /// multiplied by e^`share` for its size. What was not explored has levels like those of the
-    /// rest.
+    /// multiplied by e^`share` for its size. What was not explored within a surface has levels like
+    /// those of the rest; beyond the ends of a curve they may be any.
     ///
     /// In a gap, where the surface is not as predicted, a contact is as likely as it is of the
     /// unknown object with which the object competes: it tells nothing between the two.
@@ -72,10 +75,16 @@ impl Unexplored {
             let alike = likelihood_below_one(contact, own, library.level_prior());
             let step_m = (contact.position_m - last.position_m).norm();
             let open = indexed.open.as_ref()?;
-            let density = |log: f64, stay: f64| stay * alike * (log + share(*of)).exp();
+            let density = |log: f64, stay: f64| stay * (log + share(*of)).exp();
+            let stay = open.stay_beyond(self.walked_m, step_m);
+            let (alike_beyond, beyond) = if open.has_holes {
+                (alike, least)
+            } else {
+                (1.0, unknown.log)
+            };
             let density = UnpredictedDensity {
-                gap: density(unknown.log, open.stay_in_gap(step_m)),
-                open: density(least, open.stay_beyond(step_m)),
+                gap: alike * density(unknown.log, open.stay_in_gap(step_m)),
+                open: alike_beyond * density(beyond, stay),
             };
             Some((*of, density))
         });
@@ -102,7 +111,7 @@ impl Unexplored {
             };
             let ways = (open.entries().len() * rotations.len()).max(1) as f64;
             let step_m = (contact.position_m - last.position_m).norm();
-            let enters = (1.0 - open.stay_beyond(step_m)).max(ENTER_MIN);
+            let enters = (1.0 - open.stay_beyond(self.walked_m, step_m)).max(ENTER_MIN);
             let each = log + bare + enters.ln() - ways.ln();
             for entry in open.entries() {
                 let place = &indexed.places[*entry as usize];
@@ -135,8 +144,13 @@ impl Unexplored {
         }
     }
 
-    /// A contact lay there.
-    pub(crate) fn stayed(&mut self, densities: BTreeMap<VariantId, UnpredictedDensity>) {
+    /// A contact lay there, after a step \[m\].
+    pub(crate) fn stayed(
+        &mut self,
+        densities: BTreeMap<VariantId, UnpredictedDensity>,
+        step_m: f64,
+    ) {
+        self.walked_m += step_m;
         for (of, log) in &mut self.logs {
             let density = densities.get(of).copied().unwrap_or_default();
             *log += density.open.ln();
