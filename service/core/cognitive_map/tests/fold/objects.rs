@@ -1,8 +1,8 @@
 //! Objects: taught, known again, learned on the spot, forgotten.
 
 use cognitive_map::{
-    CognitiveMap, Event, EventKind, Motion, ObjectMark, PoseNoise, Record, Sample, SampleBody,
-    Settings, SettingsValues, SkipReason, Spacing, TouchNoise,
+    CognitiveMap, EventKind, Motion, ObjectMark, PoseNoise, Record, Sample, SampleBody, Settings,
+    SettingsValues, SkipReason, Spacing, TouchNoise,
 };
 use object_recognition::{Orientation, Verdict};
 
