@@ -51,32 +51,8 @@ pub(crate) async fn declare(
             .await?;
         queryables.push(queryable);
     }
-    queryables.push(declare_unknown(space, session).await?);
     queryables.extend(latest::declare(space, session, engine, room).await?);
     Ok(queryables)
-}
-
-/// Refuses what is asked by no verb. It is not complete, so that questions by a verb go to whoever
-/// answers that.
-async fn declare_unknown(space: &str, session: &Session) -> Result<Queryable<()>, TransportError> {
-    let runtime = Handle::current();
-    let queryable = session.declare_queryable(query_key(space, "*"));
-    let queryable = queryable.callback(move |query| {
-        let key = query.key_expr().as_str();
-        let asked = key.rsplit('/').next().unwrap_or_default();
-        let verbs = Verb::ALL.map(Verb::as_str);
-        if asked.contains('*') || verbs.contains(&asked) {
-            return;
-        }
-        let detail = format!("{asked:?} is no verb: {}", verbs.join(", "));
-        let problem = Problem::new(Kind::UnknownRoute, detail);
-        // Zenoh waits where the link to whoever asked is congested.
-        runtime.spawn_blocking(move || {
-            let codec = codec_of(&query).unwrap_or(Codec::Json);
-            refuse(&query, codec, &problem);
-        });
-    });
-    Ok(queryable.await?)
 }
 
 async fn reply(engine: &Engine, verb: Verb, query: Query, permit: Option<OwnedSemaphorePermit>) {
